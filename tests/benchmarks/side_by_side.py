@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "shared")]
-from referee import Arm, closely, joints_of
+from referee import TAU, Arm, closely, joints_of, placement
 
-from coverable import Task, check, list_robots, load_robot, plane, poses
+from coverable import Task, check, load_robot, plane, poses
 
 Floats = NDArray[np.float64]
 Answer = tuple[str, Floats | None]  # what the tool says, and its joint values (k, 6) rad
@@ -55,12 +55,8 @@ class Square(NamedTuple):
 
     def turns(self) -> Floats:
         """(k, 4, 4) of the tool: the one that is asked for, or samples where the roll is free."""
-        found = np.zeros((1 if self.fixed else ROLLS, 4, 4))
-        roll = 2.0 * np.pi * np.arange(len(found)) / ROLLS
-        c, s = np.cos(roll), np.sin(roll)
-        found[:, 0, 0], found[:, 1, 0], found[:, 0, 1], found[:, 1, 1] = c, -s, -s, -c
-        found[:, 2, 2], found[:, 3, 3] = -1.0, 1.0
-        return found
+        rolls = range(1 if self.fixed else ROLLS)
+        return np.array([placement(rpy=(np.pi, 0.0, TAU * roll / ROLLS)) for roll in rolls])
 
 
 SQUARES = [
@@ -76,13 +72,10 @@ SQUARES = [
 
 def bare_urdf(square: Square, file: Path) -> Arm:
     """Write the URDF without shapes, collisions being nobody's question, and with the limits."""
-    arm = next(robot for robot in list_robots() if robot.name == "ur5")
-    robot = ElementTree.parse(arm.urdf).getroot()
+    robot = ElementTree.parse(load_robot("ur5").urdf).getroot()
+    robot[:] = [part for part in robot if part.tag in ("link", "joint")]
     for link in robot.iter("link"):
-        for part in [*link.findall("visual"), *link.findall("collision")]:
-            link.remove(part)
-    for part in [part for part in robot if part.tag not in ("link", "joint")]:
-        robot.remove(part)
+        link[:] = link.findall("inertial")
     turning = [j for j in robot.iter("joint") if j.get("type") == "revolute"]
     for joint, ends in zip(turning, square.limits_deg, strict=True):
         for end, value in zip(("lower", "upper"), ends or (), strict=ends is not None):
@@ -95,8 +88,7 @@ def bare_urdf(square: Square, file: Path) -> Arm:
 def measured(arm: Arm, q: Floats, square: Square) -> dict[str, object]:
     """The largest of each along a motion that is straight in joint space between its rows."""
     looked, points = closely(q, math.radians(0.2)), square.points()
-    at = arm.placed(looked)
-    tool, x, axis = at[:, :3, 3], at[:, :3, 0], at[:, :3, 2]
+    tool, axis, x = arm.tool(looked)
     off = np.full(len(tool), np.inf)
     for here, there in pairwise(points):
         share = np.clip((tool - here) @ (there - here) / ((there - here) @ (there - here)), 0, 1)
@@ -152,7 +144,7 @@ def eaik(square: Square, file: Path) -> Callable[[], Answer]:
             found = [np.empty((0, 6))]
             for one in robot.IK_batched(at @ offset):
                 found.append(np.reshape(one.Q, (-1, 6))[~np.array(one.is_LS, dtype=bool)])
-            q = np.pi - np.mod(np.pi - np.concatenate(found), 2.0 * np.pi)
+            q = np.pi - np.mod(np.pi - np.concatenate(found), TAU)
             rungs.append(q[((q >= low) & (q <= high)).all(axis=1)])
         missing = sum(len(rung) == 0 for rung in rungs)
         if missing:
@@ -174,14 +166,8 @@ def eaik(square: Square, file: Path) -> Callable[[], Answer]:
 def descartes(square: Square, file: Path) -> Callable[[], Answer]:
     """The ladder planner of Tesseract, by its Python wrapper and its own IK for this arm."""
     from tesseract_robotics import tesseract_command_language as language
+    from tesseract_robotics import tesseract_common as common
     from tesseract_robotics import tesseract_motion_planners_descartes as planners
-    from tesseract_robotics.tesseract_common import (
-        GeneralResourceLocator,
-        Isometry3d,
-        ManipulatorInfo,
-        Quaterniond,
-        Translation3d,
-    )  # fmt: skip
     from tesseract_robotics.tesseract_environment import Environment
     from tesseract_robotics.tesseract_motion_planners import PlannerRequest
 
@@ -193,7 +179,7 @@ def descartes(square: Square, file: Path) -> Callable[[], Answer]:
         + plugin.format(kind="fwd", group=GROUP, name="KDLFwdKinChain", chain=chain)
         + plugin.format(kind="inv", group=GROUP, name="URInvKin", chain=f"{chain}, model: UR5")
     )
-    urdf, locator, environment = file.read_text(), GeneralResourceLocator(), Environment()
+    urdf, locator, environment = file.read_text(), common.GeneralResourceLocator(), Environment()
     srdf = (
         f'<robot name="{ElementTree.fromstring(urdf).get("name")}" version="1.0.0"><group '
         f'name="{GROUP}"><chain base_link="{BASE}" tip_link="{TIP}"/></group>'
@@ -201,15 +187,15 @@ def descartes(square: Square, file: Path) -> Callable[[], Answer]:
     )
     if not environment.init(urdf, srdf, locator):
         raise RuntimeError("Tesseract cannot read the arm")
-    manipulator = ManipulatorInfo()
+    manipulator = common.ManipulatorInfo()
     manipulator.tcp_frame, manipulator.working_frame = TIP, BASE
     manipulator.manipulator = GROUP
     profile = planners.DescartesDefaultPlanProfileD()
     profile.target_pose_fixed = square.fixed
     profile.target_pose_sample_axis = np.array([0.0, 0.0, 1.0])
-    profile.target_pose_sample_resolution = 2.0 * np.pi / ROLLS
+    profile.target_pose_sample_resolution = TAU / ROLLS
     profile.target_pose_sample_min = -np.pi
-    profile.target_pose_sample_max = np.pi - 2.0 * np.pi / ROLLS
+    profile.target_pose_sample_max = np.pi - TAU / ROLLS
     profile.allow_collision = True
     profile.enable_collision = profile.enable_edge_collision = False
     profiles = language.ProfileDictionary()
@@ -221,7 +207,8 @@ def descartes(square: Square, file: Path) -> Callable[[], Answer]:
         program = language.CompositeInstruction("DEFAULT")
         program.setManipulatorInfo(manipulator)
         for x, y, z in square.points():
-            down = Isometry3d.Identity() * Translation3d(x, y, z) * Quaterniond(0.0, 1.0, 0.0, 0.0)
+            down = common.Isometry3d.Identity() * common.Translation3d(x, y, z)
+            down *= common.Quaterniond(0.0, 1.0, 0.0, 0.0)
             waypoint = language.CartesianWaypointPoly_wrap_CartesianWaypoint(
                 language.CartesianWaypoint(down)
             )

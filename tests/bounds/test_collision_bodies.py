@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 from foreign_clearances import distance_from_hull
+from referee import unit
 from samples import sampled, spread
 
 from coverable import Axis, Collision, Obstacle, ToolShape, load_robot, plane
@@ -143,8 +144,7 @@ def test_the_tool_of_an_arm_that_holds_the_part_is_what_stands_on_the_tool_frame
 def test_a_half_space_is_as_far_as_its_box_from_all_that_the_arm_reaches(height):
     floor = Obstacle.halfspace("floor", (4.0, -7.0, height), (30.0, -10.0, 20.0))
     (box,), rng = seen(floor, 1.3), np.random.default_rng(2)
-    points = rng.normal(size=(60, 3))
-    points *= 1.3 * rng.uniform(0.2, 1.0, (60, 1)) / np.linalg.norm(points, axis=1)[:, None]
+    points = unit(rng.normal(size=(60, 3))) * 1.3 * rng.uniform(0.2, 1.0, (60, 1))
     for point in points:
         above = max(0.0, floor.placement[:3, 2] @ (point - floor.placement[:3, 3]))
         off = distance_from_hull(point, box.vertices) - box.radius

@@ -7,25 +7,19 @@ import pytest
 from bounds import holds
 from capsule_arms import at, bodies_of, box_mesh, fork, pair, planar_arm
 from mesh_patches import of_patch
+from random_arms import seen
+from referee import unit
 
 from coverable import Obstacle, load_robot, sphere
 from feasibility.certification.collisions.collision_replay import Couples, collision_replay
 from feasibility.certification.collisions.judged_shapes import Body
 from feasibility.certification.collisions.motion import ArmMotion
 from feasibility.collisions.problem_bodies import Soup
-from robots.kinematics import Kinematics
 from robots.shapes.bodies import Solid
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 UR5 = load_robot("ur5")
 COAL = 1e-7  # m, what coal's distances may be off
-
-
-def seen(robot, q, a, b, points):
-    """Points (k, 3) of joint b as seen from joint a, at configurations q (m, n)."""
-    frames = Kinematics(robot).joints(q)
-    world = np.einsum("mij,kj->mki", frames.rotations[:, b], points) + frames.points[:, None, b]
-    return np.einsum("mji,mkj->mki", frames.rotations[:, a], world - frames.points[:, None, a])
 
 
 def how_far(robot, rows, deviations, a, b, points, rng):
@@ -65,8 +59,7 @@ def test_no_point_moves_or_leaves_its_chord_further(step):
             rows = np.vstack([q, q + step * rng.normal(size=robot.n)])
             centre, ball = rng.normal(size=3) * 0.3, rng.uniform(0.01, 0.3)
             deviations = step * 0.2 * rng.random((1, robot.n))
-            around = rng.normal(size=(60, 3))
-            points = centre + ball * around / np.linalg.norm(around, axis=1, keepdims=True)
+            points = centre + ball * unit(rng.normal(size=(60, 3)))
             bounds.append(bends(robot, rows, a, b, centre, ball, deviations))
             truths.append(how_far(robot, rows, deviations, a, b, points, rng))
             q = q + step * rng.normal(size=robot.n)
@@ -92,8 +85,7 @@ def test_bodies_reach_no_further_than_is_said(shape):
     rng = np.random.default_rng(1)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     body = Body(Solid("", 0, at(0.1, 0.2, 0.3, turn * np.sign(np.linalg.det(turn))), shape))
-    n = rng.normal(size=(40, 3))
-    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    n = unit(rng.normal(size=(40, 3)))
     dot, far = Body(Solid("", 0, np.eye(4), Sphere(1e-6))), 1e4  # its distance is a height
     places = dot.placed(np.tile(np.eye(3), (40, 1, 1)), far * n)
     reach = np.array([far - 1e-6 - body.distance(dot, place)[0] for place in places])
@@ -147,21 +139,21 @@ def test_no_bound_is_above_a_distance(step):
     assert (np.quantile(spare, 0.1, axis=0) < 0.1).all()
 
 
-def dome(count):
-    """A quarter of a sphere of radius 1 in 2 count^2 triangles."""
-    made = of_patch(sphere(1.0, np.degrees((0.3, 1.5)), (0, 180), "outside"), count, count)
-    return made.vertices[made.faces]
+def in_a_dome(rng, body):
+    """An arm, a walk of it, the body that it carries, and a quarter of a sphere of radius 1 m."""
+    robot = planar_arm([0.3, 0.4, 0.1], ["revolute", "revolute", "prismatic"])
+    steps = rng.normal(size=(60, 3)) * [0.08, 0.08, 0.02]
+    walk = np.array([0.6, 0.3, 0.2]) + np.cumsum(steps, axis=0)
+    made = of_patch(sphere(1.0, np.degrees((0.3, 1.5)), (0, 180), "outside"), 20, 20)
+    soup = Soup("surface", made.vertices[made.faces], 0.0, False)
+    return robot, walk, Solid("tool", 3, at(0.05), body), soup
 
 
 @pytest.mark.parametrize("off", [0.0, 0.01])
 @pytest.mark.parametrize("body", SHAPES[:4], ids=lambda body: type(body).__name__)
 def test_clearance_of_many_triangles_is_never_above_the_distance_and_seldom_far_below(body, off):
     """A body that turns and slides inside a dome: coal at samples of each stretch."""
-    rng = np.random.default_rng(3)
-    robot = planar_arm([0.3, 0.4, 0.1], ["revolute", "revolute", "prismatic"])
-    walk = np.cumsum(rng.normal(size=(60, 3)) * [0.08, 0.08, 0.02], axis=0)
-    walk += [0.6, 0.3, 0.2]
-    solid, soup = Solid("tool", 3, at(0.05), body), Soup("surface", dome(20), 0.0, False)
+    robot, walk, solid, soup = in_a_dome(np.random.default_rng(3), body)
     for start in range(0, 60, 20):
         rows = walk[start : start + 6]
         q = np.concatenate([np.linspace(*ends, 10) for ends in pairwise(rows)])
@@ -193,10 +185,7 @@ def test_the_most_that_joints_deviate_along_a_stretch_counts(more):
 def test_a_closer_look_certifies_no_more_than_there_is(calls):
     """A bar in a dome, asked for other distances along each segment, with few calls and many."""
     rng, raised = np.random.default_rng(calls), 0
-    robot = planar_arm([0.3, 0.4, 0.1], ["revolute", "revolute", "prismatic"])
-    walk = np.cumsum(rng.normal(size=(60, 3)) * [0.08, 0.08, 0.02], axis=0)
-    walk += [0.6, 0.3, 0.2]
-    solid, soup = Solid("tool", 3, at(0.05), SHAPES[0]), Soup("surface", dome(20), 0.0, False)
+    robot, walk, solid, soup = in_a_dome(rng, SHAPES[0])
     for start in range(0, 60, 6):
         rows = walk[start : start + 6]
         q = np.concatenate([np.linspace(*ends, 15) for ends in pairwise(rows)])

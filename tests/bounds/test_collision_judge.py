@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from capsule_arms import at, bodies_of, box_mesh, capsule_links, fork, pair, planar_arm, wall_at
+from mesh_patches import stacked
 
 from coverable import Obstacle
 from coverable.errors import ArgumentError
@@ -122,8 +123,8 @@ def test_a_ball_wholly_inside_a_mesh(closed, carried):
 def test_a_mesh_within_a_mesh_and_a_room_with_walls():
     """A room is solid in its walls alone: its inner shell is turned inwards."""
     inner, outer = box_mesh((1.0, 1.0, 1.0)), box_mesh((1.2, 1.2, 1.2))
-    faces = np.vstack([outer.faces, inner.faces[:, ::-1] + len(outer.vertices)])
-    room = Triangles(np.vstack([outer.vertices, inner.vertices]), faces, True)
+    shells = (outer.vertices, outer.faces), (inner.vertices, inner.faces[:, ::-1])
+    room = Triangles(*stacked(*shells), True)
     for thing, far, accepted in ((outer, 0.3, False), (room, 0.3, True), (room, 0.45, False)):
         bodies = sliding(box_mesh((0.2, 0.2, 0.2)), thing, place=np.eye(4))
         assert judged(SLIDE, bodies, [-0.2], [far]).accepted is accepted

@@ -1,12 +1,14 @@
 """Motions among many bodies: the judge of collisions beside python-fcl, and what it certifies."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 from capsule_arms import at, bodies_of, box_mesh
-from foreign_clearances import ForeignScene, samples
+from foreign_clearances import ForeignScene
 from mesh_patches import grid
+from referee import closely
 from samples import sampled, spread
 from scipy.spatial.transform import Rotation
 
@@ -41,14 +43,9 @@ def random_scene(name, seed, rows, step, waves):
     wavy = np.stack([0.5 * u, 0.5 * v, 0.3 * np.sin(2.0 * u) * np.cos(2.5 * v)], axis=1)
     sheet = Soup("surface", (rng.uniform(-1, 1, 3) + wavy)[faces], 0.0003, False)
     joints = {solid.owner: solid.joint for solid in solids}
-    links = list(joints)
-    moving = [link for link in links if joints[link] > 1]
-    pairs = [
-        Pair(a, b, 0.002)
-        for k, a in enumerate(links)
-        for b in links[k + 1 :]
-        if abs(joints[a] - joints[b]) > 1
-    ]
+    moving = [link for link in joints if joints[link] > 1]
+    apart = [(a, b) for a, b in combinations(joints, 2) if abs(joints[a] - joints[b]) > 1]
+    pairs = [Pair(a, b, 0.002) for a, b in apart]
     pairs += [Pair(link, thing.name, 0.004) for link in moving for thing in scene]
     pairs += [Pair(link, "surface", 0.001) for link in moving]
     low, high = np.maximum(robot.lower, -3.0), np.minimum(robot.upper, 3.0)
@@ -59,7 +56,7 @@ def random_scene(name, seed, rows, step, waves):
 def judged_as_by_fcl(robot, bodies, q, step_deg):
     """Refused are exactly the pairs that fcl finds too near; the certified bound is below fcl's."""
     found, foreign = collision_replay(robot, bodies, q), ForeignScene(robot, bodies)
-    rows = samples(q, np.radians(step_deg))
+    rows = closely(q, np.radians(step_deg))
     least = np.min([foreign.distances(row) for row in rows], axis=0)
     refused = {fault.pair for fault in found.faults}
     for pair, distance in zip(bodies.pairs, least, strict=True):
@@ -102,7 +99,7 @@ def walk():
 @pytest.fixture(scope="module")
 def least(walk):
     foreign = ForeignScene(UR5, asked()[1])
-    return np.min([foreign.distances(row) for row in samples(walk.q, np.radians(3.0))], axis=0)
+    return np.min([foreign.distances(row) for row in closely(walk.q, np.radians(3.0))], axis=0)
 
 
 def test_more_clearance_than_there_is_is_refused(walk, least):

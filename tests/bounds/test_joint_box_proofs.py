@@ -20,8 +20,7 @@ from robots.shapes.bodies import HalfSpace, Solid
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
 FEW = ("puma560", "puma560 on a rail", "ur5")
-ROUNDING = 1e-9
-X, Y, Z = np.eye(3)
+X, _, Z = np.eye(3)
 ANYWHERE = 1e3  # m, that the tool may be off
 
 

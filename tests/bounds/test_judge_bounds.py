@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from arm_urdfs import joint
+from arm_urdfs import finite_limits, joint
 from bounds import holds
-from random_arms import between, finite_limits, random_arm, robot_of
+from random_arms import between, random_arm, robot_of
 from samples import sampled, seeds
 
 from coverable import Task, cylinder, mesh, plane

@@ -25,14 +25,9 @@ PIPE = cylinder(0.02, (-170, 170), (-1, 1), rpy_deg=(90, 0, 0), **OUT)  # along 
 VALLEY = mesh(TriangleMesh(*mesh_patches.bent(
     lambda u, v: (u - 0.5, v - 0.5, 0.1 * np.abs(u - 0.5)), 2, 1)), **OUT)  # fmt: skip
 STEEP = replace(FLOOR, side="inside")
-RIDGE = mesh(
-    TriangleMesh(
-        *mesh_patches.bent(
-            lambda u, v: (u - 0.5, v - 0.5, np.maximum(0.1 - np.abs(u - 0.5), 0.0)), 10, 1
-        )
-    ),
-    **OUT,
-)
+RIDGE = mesh(TriangleMesh(*mesh_patches.bent(
+    lambda u, v: (u - 0.5, v - 0.5, np.maximum(0.1 - np.abs(u - 0.5), 0.0)), 10, 1)),
+    **OUT)  # fmt: skip
 
 LIFTED = {
     "above": (FLOOR, [(0.1, 0.05), (0.9, 0.05)], 0.0),

@@ -7,7 +7,7 @@ import pytest
 from capsule_arms import at as placed
 from capsule_arms import bodies_of, pair
 from gantry import SURFACES, configurations, gantry, marks_of, places_along, raster, tools_of
-from referee import Facets
+from referee import Facets, unit
 from referee import evenly as dense
 from samples import sampled, spread
 
@@ -38,8 +38,7 @@ def off_and_tilt(cells, task, q):
 def leaning(name, angle):
     made = raster(name)
     points, axes = places_along(made.cells, made.task)
-    side = np.cross(axes, [0.3, 0.5, 0.7])
-    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    side = unit(np.cross(axes, [0.3, 0.5, 0.7]))
     q = configurations(points, np.cos(angle) * axes + np.sin(angle) * side)
     return made._replace(q=q)
 
@@ -211,8 +210,7 @@ def test_the_figure_of_a_single_cell_is_that_of_the_closest_point_inside_the_con
     ball = sphere(0.02, (0, 30), (0, 360), side="outside", position=(0.5, 0.1, 0.4)).cells(1, 1)
     target = Task(0.002, cone).targets(ball).points[0]
     normal = (target - [0.5, 0.1, 0.4]) / 0.022
-    across = np.cross(normal, [0.3, 0.5, 0.7])
-    point = target + 0.004 * across / np.linalg.norm(across)
+    point = target + 0.004 * unit(np.cross(normal, [0.3, 0.5, 0.7]))
     q = configurations(point[None], -normal[None])
     task, needed = Task(0.002, cone, 5e-3), np.ones(1, dtype=bool)
     found = replay(gantry(), ball, task, Walk(q, np.array([0])), needed)

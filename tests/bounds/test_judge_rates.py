@@ -11,13 +11,9 @@ from samples import sampled, seeds
 
 from coverable import Task, load_robot, plane
 from coverable.errors import ArgumentError
+from feasibility.certification import segment_rates as rates
 from feasibility.certification.lever_bounds import jacobians, levers_along, second_derivatives
 from feasibility.certification.rate_replay import check_rates, in_place, replay_rates
-from feasibility.certification.segment_rates import (
-    fastest_anywhere,
-    segment_rates,
-    smallest_singular_values,
-)
 from feasibility.verdict import Walk
 from robots.kinematics import Kinematics
 
@@ -53,13 +49,13 @@ def test_bounds_hold_and_are_close(name, seed):
     robot = unlike(name)
     robot = replace(robot, max_velocity=np.linspace(1.0, 3.0, robot.n))
     starts, ends = segments(robot, 4, seed + 1)
-    found = segment_rates(robot, starts, ends, sigma=np.inf, group=np.arange(4))
+    found = rates.segment_rates(robot, starts, ends, sigma=np.inf, group=np.arange(4))
     for k, (a, b) in enumerate(zip(starts, ends, strict=True)):
         speed, value = sampled_rates(robot, a, b)
         assert 0.99 * speed <= found.speed[k] <= speed * (1 + 1e-9)
         assert found.sampled_speed[k] >= speed * (1 - 1e-3)
         assert 0.99 * value - 1e-4 <= found.sigma[k] <= value * (1 + 1e-6) + 1e-9
-        assert fastest_anywhere(robot) >= speed
+        assert rates.fastest_anywhere(robot) >= speed
 
 
 CHAINS = {
@@ -91,9 +87,9 @@ def test_a_single_look_shows_what_the_lemmas_say(name):
                 if slides[j]:
                     change = turns[:j].sum() if cap > 1.0 else 0.0
                 square += (change / unit) ** 2
-        sigma = 0.5 * (smallest_singular_values(robot, q).sum() - np.sqrt(square))
+        sigma = 0.5 * (rates.smallest_singular_values(robot, q).sum() - np.sqrt(square))
         if min(speed, sigma) > 1e-6:
-            found = segment_rates(robot, q[:1], q[1:], speed=1e-6, sigma=1e-6)
+            found = rates.segment_rates(robot, q[:1], q[1:], speed=1e-6, sigma=1e-6)
             assert found.speed[0] == pytest.approx(speed)
             assert found.sigma[0] == pytest.approx(sigma)
             shown += 1
@@ -108,7 +104,7 @@ def test_the_smallest_of_the_singular_values_is_the_fifth():
     point = np.vstack(Kinematics(robot).jacobians(q[0]))
     point[:3] /= scale
     values = np.sort(np.linalg.svd(point, compute_uv=False))
-    assert smallest_singular_values(robot, q)[0] == pytest.approx(values[1])
+    assert rates.smallest_singular_values(robot, q)[0] == pytest.approx(values[1])
     assert values[0] < 1e-9
 
 
@@ -118,7 +114,7 @@ def test_no_speed_is_more_than_all_joints_make_in_one_line():
          joint(3, "fixed", (0.3, 0, 0))]
     )  # fmt: skip
     robot = replace(robot, max_velocity=np.array([2.0, 0.7]))
-    assert fastest_anywhere(robot) == pytest.approx(2.0 * (1.0 + 2.0 + 0.3) + 0.7)
+    assert rates.fastest_anywhere(robot) == pytest.approx(2.0 * (1.0 + 2.0 + 0.3) + 0.7)
 
 
 @pytest.mark.parametrize(("factor", "possible"), [(0.98, True), (1.02, False)])
@@ -126,7 +122,7 @@ def test_what_is_asked_is_decided_and_nothing_more(factor, possible):
     starts, ends = segments(UR5, 6, 3)
     for a, b in zip(starts, ends, strict=True):
         speed, sigma = sampled_rates(UR5, a, b)
-        found = segment_rates(UR5, a[None], b[None], factor * speed, factor * sigma)
+        found = rates.segment_rates(UR5, a[None], b[None], factor * speed, factor * sigma)
         assert (found.speed[0] >= factor * speed) == possible
         assert (found.sigma[0] >= factor * sigma) == possible
 
@@ -163,7 +159,7 @@ def test_stops_are_counted_and_the_joint_is_named():
 @pytest.mark.parametrize("sigma", [0.98, 1.02])
 def test_the_distance_from_singularities_is_kept_also_where_the_tool_rests(sigma):
     walk = line(0.4)
-    least = smallest_singular_values(ARM, walk.q).min()
+    least = rates.smallest_singular_values(ARM, walk.q).min()
     for rows in (walk.q, walk.q[:1]):
         asked = replace(TASK, min_manipulability=sigma * least)
         found = replay_rates(ARM, PLATE, asked, Walk(rows, np.full(len(rows), -1)))
@@ -184,12 +180,8 @@ IN_PLACE = {  # mm beside the target at both ends; radius (mm) of a whole turn b
 @pytest.mark.parametrize("name", IN_PLACE)
 def test_in_place_is_a_tenth_of_the_tolerance_at_the_ends_and_all_of_it_between(name):
     (first, last), radius, expected = IN_PLACE[name]
-    arm = [
-        joint(1, "prismatic", axis=(1, 0, 0)),
-        joint(2),
-        joint(3, "fixed", (1e-3 * radius, 0, 0)),
-    ]
     at = (1e-3 * radius, 0, 0)
+    arm = [joint(1, "prismatic", axis=(1, 0, 0)), joint(2), joint(3, "fixed", at)]
     cells = plane((-0.1, 0.1), (-0.1, 0.1), "outside", at).cells(1, 1)
     rows = np.array([[1e-3 * first, 0.0], [1e-3 * last, 2.0 * np.pi]])
     assert in_place(robot_of(arm), cells, Task(0.0, 90, 1e-3), rows)[0] == expected

@@ -15,12 +15,6 @@ from feasibility.certification import roll_held
 from feasibility.certification.lever_bounds import jacobians
 from feasibility.certification.motion_replay import replay_over_surface
 from feasibility.certification.roll_box_models import Directions, reference_parts
-from feasibility.certification.roll_held import (
-    HeldRoll,
-    frame_second_derivatives,
-    largest_off,
-    vectors_of,
-)
 from feasibility.roll import Roll
 from feasibility.targets.references import u_directions
 from feasibility.verdict import Walk
@@ -44,12 +38,12 @@ def test_a_range_holds_the_roll_all_along_and_hardly_less_would(half, middle):
     rng, roll, used = np.random.default_rng(3), Roll(middle, half), []
     for size in (0.03, 0.3, 1.0):
         x, y, t, u = lines(rng, 300, size)
-        z0, z1 = (vectors_of(x[k], y[k], t[k], u[k], roll) for k in (0, 1))
+        z0, z1 = (roll_held.vectors_of(x[k], y[k], t[k], u[k], roll) for k in (0, 1))
         second = roll_held.products_of_changes(*(one[1] - one[0] for one in (x, y, t, u)))
         unknown = size * rng.random((len(z0), 2)) * rng.integers(0, 2, (1, 2))
-        found = largest_off(z0, z1, second, unknown, half)
+        found = roll_held.largest_off(z0, z1, second, unknown, half)
         at = ((1.0 - S[..., None]) * one[0] + S[..., None] * one[1] for one in (x, y, t, u))
-        z = vectors_of(*at, roll)
+        z = roll_held.vectors_of(*at, roll)
         # What is not known of both ends may point anywhere.
         for angle in np.linspace(-np.pi, np.pi, 7):
             way = np.array([np.cos(angle), np.sin(angle)])
@@ -66,11 +60,11 @@ def test_wide_ranges_are_certified_from_end_to_end():
     angle = np.radians(np.linspace(-149, 149, 60))
     z, none = 2.0 * np.column_stack([np.cos(angle), np.sin(angle)]), np.zeros((59, 2))
     bend = 2.0 * np.diff(angle) ** 2
-    bound = largest_off(z[:-1], z[1:], bend, none, np.radians(150))
+    bound = roll_held.largest_off(z[:-1], z[1:], bend, none, np.radians(150))
     assert np.isfinite(bound).all()
     assert (bound >= np.maximum(np.abs(angle[1:]), np.abs(angle[:-1])) - 1e-9).all()
     across = 2.0 * np.array([[-1.0, 0.1], [-1.0, -0.1]])
-    assert not np.isfinite(largest_off(across[:1], across[1:], bend[:1], none[:1], 3.0))
+    assert not np.isfinite(roll_held.largest_off(across[:1], across[1:], bend[:1], none[:1], 3.0))
 
 
 @sampled("seed", seeds(6, all=60))
@@ -81,7 +75,7 @@ def test_frames_of_the_tool_bend_no_more_than_is_said(seed):
     ends = rng.uniform(-1.0, 1.0, (2, robot.n))
     steps, poses = np.abs(np.diff(ends, axis=0)), jacobians(Kinematics(robot), ends)
     x = Kinematics(robot).held(ends)[2]
-    bound = frame_second_derivatives(steps, robot.prismatic, poses, x)[0]
+    bound = roll_held.frame_second_derivatives(steps, robot.prismatic, poses, x)[0]
     q = ends[0] + S * (ends[1] - ends[0])
     _, axes, x = Kinematics(robot).held(q)
     bent = [np.diff(one, n=2, axis=0) * 100.0**2 for one in (x, np.cross(axes, x))]
@@ -96,7 +90,8 @@ def test_references_bend_no_more_than_is_said(kind):
     rng, count = np.random.default_rng(5), 400
     surface = cylinder(1.0, (-170, 170), (-1, 1)) if kind == "tube" else None
     surface = surface or sphere(1.0, (20, 160), (-180, 180))
-    offset, held = offset_surface(surface, 0.0, directed=True), HeldRoll(Roll(0.0, 1.4), False)
+    offset = offset_surface(surface, 0.0, directed=True)
+    held = roll_held.HeldRoll(Roll(0.0, 1.4), False)
     middle = [np.pi / 2, 0.0] if kind != "tube" else [0.4, 0.0]
     way = 10.0 ** rng.uniform(-3, -1.3, (count, 1)) * rng.normal(size=(count, 2))
     beside = np.linalg.norm(way, axis=1, keepdims=True) * rng.uniform(0.7, 3.0, (count, 1))
@@ -140,7 +135,7 @@ def test_the_bounds_of_references_are_those_of_the_lemma(kind):
         aside, own = rng.uniform(0.001, 0.02, (2, 3))
         own *= kind != "fixed"
         roll = Roll(0.1, half)
-        held = HeldRoll(roll, kind == "square")
+        held = roll_held.HeldRoll(roll, kind == "square")
         at, none = np.array([0.0, 0.4, 0.4, 1.0]), np.zeros((1, 4, 3))
         off = np.stack([0.0 * aside, aside, own], axis=1)[None]
         path = PlacePaths(at[None], none, b[None], e[None], off, none[..., 0], none[..., :2])
@@ -163,11 +158,11 @@ def test_the_bounds_of_references_are_those_of_the_lemma(kind):
             dx, dy, dt, du = (last - first for first, last in zip(*ends, strict=True))
             most = 2.0 * np.hypot(dt @ dx + du @ dy, du @ dx - dt @ dy)
             most += (at[k + 1] - at[k]) ** 2 * second + np.sqrt(2.0) * of_u
-            z0 = vectors_of(*one, t[k], u[k], roll)[None]
-            z1 = vectors_of(*other, t[k + 1], u[k + 1], roll)[None]
+            z0 = roll_held.vectors_of(*one, t[k], u[k], roll)[None]
+            z1 = roll_held.vectors_of(*other, t[k + 1], u[k + 1], roll)[None]
             unknown = np.array([[s * (1.0 - s) / 2.0 * second for s in at[k : k + 2]]])
             unknown += np.sqrt(2.0) * (2.0 * d_t + d_b)
-            worst.append(largest_off(z0, z1, np.array([most]), unknown, half)[0])
+            worst.append(roll_held.largest_off(z0, z1, np.array([most]), unknown, half)[0])
         ends = [tuple(np.split(one, 2)) for one in (x, axes)]
         found = held.rolls_between(*ends, np.array([second]), path)
         assert found[0] == pytest.approx(max(worst), abs=1e-7)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from bounds import holds
 from part_walks import at_parameters
-from random_arms import random_arm
+from random_arms import random_arm, tilted
 from random_surfaces import KINDS, random_surface
+from referee import unit
 from samples import sampled, seeds
 from scipy.spatial.transform import Rotation
 from specimens import cells_of
@@ -30,7 +31,6 @@ PATCHES = (
     hyperboloid(0.4, 0.3, (0, 200), (-0.3, 0.4), side="inside"),
     cone(0.4, 0.5, (0, 300), (-0.2, 0.3), **OUT), torus(0.5, 0.2, (0, 360), (0, 360), **OUT),
 )  # fmt: skip
-FAR = 8.0  # [rad], [m] that regions may pass the limits by
 EXACT = 0.3  # share of deviations, tilts and box faces that are as large as they may be
 X, Y, Z = np.eye(3)
 
@@ -47,11 +47,6 @@ def up_to(rng, most):
     return most if rng.random() < EXACT else most * rng.random()
 
 
-def across(rng, vector):
-    found = np.cross(vector, rng.normal(size=3))
-    return found / np.linalg.norm(found)
-
-
 def known(rng, boxes=50):
     """A random arm at a random configuration, a patch moved to its tool, and boxes around both."""
     robot = random_arm(rng)
@@ -61,11 +56,11 @@ def known(rng, boxes=50):
     tolerance, angle = np.exp(rng.uniform(np.log([1e-4, 1e-3]), np.log([0.05, 3.0])))
     patch, standoff = PATCHES[rng.integers(len(PATCHES))], rng.choice([0.0, 0.01])
     u, v = (np.array([rng.uniform(*span)]) for span in (patch.u_range, patch.v_range))
-    approach = Rotation.from_rotvec(up_to(rng, angle) * across(rng, axis)).apply(axis)
+    approach = tilted(axis, up_to(rng, angle), rng)
     turn = Rotation.align_vectors(approach[None], -patch.side_sign * patch.normal(u, v))[0]
     turn = (Rotation.from_rotvec(approach * rng.uniform(-np.pi, np.pi)) * turn).as_matrix()
     patch = patch.moved(turn, np.zeros(3))
-    target = point + up_to(rng, tolerance) * across(rng, rng.normal(size=3))
+    target = point + up_to(rng, tolerance) * unit(np.cross(*rng.normal(size=(2, 3))))
     at = patch.point(u, v) + patch.side_sign * standoff * patch.normal(u, v)
     patch = patch.moved(np.eye(3), target - at[0])
     chord, task = 2.0 * np.sin(angle / 2.0), Task(standoff, 90.0)
@@ -84,7 +79,7 @@ def rolled_task(rng, robot, q, patch, place, standoff):
     _, axis = Kinematics(robot).tool(q)
     b = -patch.side_sign * patch.normal(*place)[0]
     reference = rng.normal(size=3)
-    along = patch.rotation @ (reference / np.linalg.norm(reference))
+    along = patch.rotation @ unit(reference)
     roll = roll_of(Kinematics(robot).held(q[None])[2][0], axis, projected(along, b)[0], b)
     half = np.exp(rng.uniform(np.log(1e-3), np.log(np.pi / 2)))
     middle = roll + rng.choice([-1.0, 0.0, 1.0]) * 0.999 * half

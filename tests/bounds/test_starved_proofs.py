@@ -7,9 +7,10 @@ import pinocchio as pin
 import pytest
 from bounds import LARGE, grown
 from capsule_arms import at, bodies_of, capsule_links, pair, planar_arm
+from hard_scenes import PLATE, UR5, over
 from proof_cases import elbow_case
 
-from coverable import Collision, Obstacle, Task, ToolShape, load_robot, plane, sphere
+from coverable import Collision, Obstacle, Task, ToolShape, plane, sphere
 from feasibility.certification.collisions.every_pose import never_clear
 from feasibility.certification.collisions.everywhere import Overlapping
 from feasibility.certification.cut_proofs import linear_models
@@ -21,8 +22,6 @@ from robots.kinematics import Kinematics
 from robots.shapes.bodies import Solid
 from robots.urdf.link_shapes import Sphere
 
-UR5 = load_robot("ur5")
-FLAT = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0, 0, 0.3))
 DOME = sphere(0.3, (0, 25), (0, 360), side="outside", position=(0.5, 0, 0.1))
 
 
@@ -73,12 +72,8 @@ def test_boxes_of_joints(roll):
 def test_a_tool_in_every_pose():
     """How far the tool point may be from its target."""
     point, down = np.array([0.5, 0, 0.3]), np.array([0, 0, -1.0])
-    asked = Collision(
-        self_=False, surface=False, scene=(Obstacle.sphere("ball", 0.3, point),),
-        tool=(ToolShape.box((0.02, 0.02, 0.1), position=(0, 0, -0.05)),),
-        allow=tuple((name, "ball") for name in UR5.link_names),
-    )  # fmt: skip
-    bodies = gather(UR5, FLAT, asked, 0.02)
+    tool = ToolShape.box((0.02, 0.02, 0.1), position=(0, 0, -0.05))
+    bodies = over(Obstacle.sphere("ball", 0.3, point), tool=tool).bodies
     for tolerance, confirmed in ((1e-3, True), (LARGE, False)):
         found = never_clear(UR5, bodies, 0.2, tolerance, point, down, most=300)
         assert found.confirmed == confirmed
@@ -90,23 +85,16 @@ def test_the_corners_of_a_box_of_tilts_count(wide, confirmed):
     point, up, cone = np.array([0.5, 0, 0.3]), np.array([0, 0, 1.0]), 0.2
     tilts = [(0.0, 0.0), *((u, v) for u in (-0.1, 0.1) for v in (-0.1, 0.1))]
     places = [point - 0.3 * pin.exp3(np.array([*tilt, 0.0])) @ up for tilt in tilts]
-    scene = tuple(
-        Obstacle.sphere(f"ball{k}", wide if k else 0.01, at) for k, at in enumerate(places)
-    )
-    asked = Collision(
-        self_=False, surface=False, scene=scene,
-        tool=(ToolShape.sphere(0.002, position=(0, 0, -0.3)),),
-        allow=tuple((name, ball.name) for name in UR5.link_names for ball in scene),
-    )  # fmt: skip
-    bodies = gather(UR5, FLAT, asked, 0.02)
+    scene = (Obstacle.sphere(f"ball{k}", wide if k else 0.01, at) for k, at in enumerate(places))
+    bodies = over(*scene, tool=ToolShape.sphere(0.002, position=(0, 0, -0.3))).bodies
     assert never_clear(UR5, bodies, cone, 1e-6, point, up, most=20_000).confirmed == confirmed
 
 
 def test_a_tool_in_a_sheet():
     """How far the sheet may be from the surface."""
-    targets = Task(0.02, 10).targets(FLAT.cells(1, 1))
+    targets = Task(0.02, 10).targets(PLATE.cells(1, 1))
     asked = Collision(self_=False, clearance=0.0, tool=(ToolShape.sphere(0.05),))
-    bodies = gather(UR5, FLAT, asked, 0.02)
+    bodies = gather(UR5, PLATE, asked, 0.02)
 
     def confirmed(bodies):
         at = targets.points[0], targets.approaches[0]

@@ -2,13 +2,15 @@
 
 from dataclasses import replace
 
+import hard_scenes
 import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
 from capsule_arms import at
-from hard_scenes import ARMS, CELLS, UR5, Over, a_plate, arm, bracket, planted_over, random_over
+from hard_scenes import ARMS, CELLS, NOZZLE, UR5, Over, bracket, over
 from random_arms import planar_arm
+from referee import unit
 from samples import sampled, seeds, spread
 
 import coverable
@@ -22,7 +24,6 @@ from robots.shapes.bodies import Solid, Triangles
 from robots.shapes.solids import checked_triangles
 from robots.urdf.link_shapes import Box, Capsule, Cylinder, Sphere
 
-NOZZLE = ToolShape.cylinder(0.01, 0.1, position=(0.0, 0.0, -0.05))
 CRATE = Obstacle.box("crate", (0.4, 0.4, 0.4), position=(0.5, 0.0, 0.3))
 TARGET = np.array([0.5, 0.0, 0.32])
 
@@ -42,17 +43,17 @@ SCENES = [*range(20, 42, 2), *range(1000, 1500)]
 
 @sampled("seed", SCENES[: len(seeds(11, 511))])
 def test_no_pose_is_clear_where_it_is_proved(seed):
-    scene, rng = random_over(seed), np.random.default_rng(seed)
+    scene, rng = hard_scenes.random_over(seed), np.random.default_rng(seed)
     assert not (scene.proved().confirmed and scene.clear_pose(30 if seed < 1000 else 2000, rng))
 
 
 def test_random_scenes_hold_both_answers():
-    assert 2 <= sum([random_over(seed).proved().confirmed for seed in SCENES[:11]]) <= 9
+    assert 2 <= sum([hard_scenes.random_over(seed).proved().confirmed for seed in SCENES[:11]]) <= 9
 
 
 @sampled("name", spread(ARMS, 2))
 def test_a_cell_with_a_known_pose_is_never_proved(name):
-    scenes = [planted_over(name, seed) for seed in seeds(7, all=150)]
+    scenes = [hard_scenes.planted_over(name, seed) for seed in seeds(7, all=150)]
     known = [one for one in scenes if one is not None]
     assert len(known) >= 2
     for one in known:
@@ -64,8 +65,8 @@ OVER_A_CELL = [(name, seed) for name in ARMS[::-1] for seed in range(1000, 1004)
 
 @sampled(("name", "seed"), spread(OVER_A_CELL, 1))
 def test_an_object_over_a_cell_is_a_proof_that_landings_bear_out(name, seed):
-    rng, robot = np.random.default_rng([seed, 2]), arm(name)
-    cells, task = a_plate(rng, robot)
+    rng, robot = np.random.default_rng([seed, 2]), hard_scenes.arm(name)
+    cells, task = hard_scenes.a_plate(rng, robot)
     cell = int(rng.integers(len(cells)))
     place = task.targets(cells).points[cell] + rng.uniform(-0.02, 0.02, 3)
     thing = Obstacle.box("thing", rng.uniform(0.1, 0.2, 3).tolist(), place)
@@ -79,13 +80,6 @@ def test_an_object_over_a_cell_is_a_proof_that_landings_bear_out(name, seed):
         over = Over.cell(robot, cells, task, one.cell)
         assert over.proved(100_000).confirmed
         assert not over.clear_pose(100, rng)
-
-
-def over(*scene, cone_deg=30.0, tool=NOZZLE, **asked):
-    """The tool alone, without the links, among objects."""
-    allow = tuple((name, one.name) for name in UR5.link_names for one in scene)
-    collision = Collision(False, False, scene=scene, tool=(tool,), allow=allow, **asked)
-    return Over.cell(UR5, CELLS, Task(0.02, cone_deg, 0.001, collision=collision))
 
 
 @pytest.mark.parametrize("gap", [-0.002, 0.002])
@@ -231,8 +225,7 @@ def inside(shape, x):
 
 def around(rng, ball, count=15):
     """Points of a ball (4,), all but on its border."""
-    way = rng.normal(size=(count, 3))
-    return ball[:3] + (1.0 - 1e-6) * ball[3] * way / np.linalg.norm(way, axis=1)[:, None]
+    return ball[:3] + (1.0 - 1e-6) * ball[3] * unit(rng.normal(size=(count, 3)))
 
 
 @pytest.mark.parametrize("shape", [*PRIMITIVES, *MESHES], ids=lambda one: type(one).__name__)

@@ -7,6 +7,7 @@ import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -182,8 +183,7 @@ def test_a_result_is_not_shown_on_another_surface(
         assert not {"tulip", "root:"} & set(str(caught.value).replace('"', " ").split())
 
 
-def no_space(*_: object) -> None:
-    raise OSError(28, "No space left on device")
+NO_SPACE = Mock(side_effect=OSError(28, "No space left on device"))
 
 
 def test_saving_is_all_or_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -191,7 +191,7 @@ def test_saving_is_all_or_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     path, args = tmp_path / "a.result", (verdict_named("plate"), case_named("plate"))
     path.write_bytes(b"what was there")
     monkeypatch.setattr(os, "umask", None)
-    monkeypatch.setattr(os, "fsync", no_space)
+    monkeypatch.setattr(os, "fsync", NO_SPACE)
     with pytest.raises(ResultError, match=r"a\.result: cannot be written: no space left"):
         save_result(*args, path)
     assert path.read_bytes() == b"what was there"
@@ -202,7 +202,7 @@ def test_saving_is_all_or_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     page, drawn = tmp_path / "page.html", view(args[0])
     assert drawn.save_html(page) == page
     before = page.read_bytes()
-    monkeypatch.setattr(os, "replace", no_space)
+    monkeypatch.setattr(os, "replace", NO_SPACE)
     with pytest.raises(FileError, match="cannot be written"):
         drawn.save_html(page)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a.result", "page.html"]

@@ -92,8 +92,8 @@ def test_a_mesh_is_scaled_and_placed(tmp_path):
 def test_a_mesh_that_cannot_be_had_becomes_a_capsule_and_a_note(tmp_path, content):
     if content is not None:
         (tmp_path / "lost.stl").write_bytes(content)
-    box = SHAPE.format('<box size="0.1 0.1 0.1"/>')
-    robot = two_links(tmp_path, base=box, arm=SHAPE.format('<mesh filename="lost.stl"/>'))
+    shapes = '<box size="0.1 0.1 0.1"/>', '<mesh filename="lost.stl"/>'
+    robot = two_links(tmp_path, *map(SHAPE.format, shapes))
     (note,) = draw(robot).notes
     assert "lost.stl" in note
     parts = drawn(robot)

@@ -5,11 +5,13 @@ import sys
 import urllib.error
 import urllib.request
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pinocchio as pin
 import pytest
 from page_outline import points_of, tracks_of
+from referee import unit
 from scipy.spatial.transform import Rotation
 
 import coverable
@@ -132,8 +134,7 @@ def test_the_frames_are_where_they_are(table):
         expected = data.oMf[robot.world_frame_id].actInv(data.oMf[number])
         _, points = object_at(commands, f"/frame of the {name}")
         np.testing.assert_allclose(points[0], expected.translation, atol=4e-5)
-        axes = points[1::2] - points[0]
-        axes /= np.linalg.norm(axes, axis=1)[:, None]
+        axes = unit(points[1::2] - points[0])
         np.testing.assert_allclose(axes.T, expected.rotation, atol=2e-3)
     path, points = object_at(commands, "/root frame")
     assert path == "/root frame"  # of the world: it does not move with the surface
@@ -212,11 +213,7 @@ def test_show_opens_a_window_waits_in_scripts_and_is_the_view_in_notebooks(verdi
     monkeypatch.setattr("webbrowser.open", lambda url: opened.append(url) or True)
     with show(verdict, block=False), urllib.request.urlopen(opened[0], timeout=GUARD_S) as answer:
         assert answer.read().decode() == view(verdict).html()
-
-    def interrupt(live):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(LiveView, "wait", interrupt)
+    monkeypatch.setattr(LiveView, "wait", Mock(side_effect=KeyboardInterrupt))
     monkeypatch.delattr(sys, "ps1", raising=False)
     live = show(verdict)
     with pytest.raises(ConnectionRefusedError):

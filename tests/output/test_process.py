@@ -14,6 +14,7 @@ import threading
 import tomllib
 import urllib.request
 from pathlib import Path
+from unittest.mock import Mock
 
 import numba
 import pytest
@@ -90,17 +91,8 @@ def test_a_terminal_sees_progress_and_stdout_the_answer_alone():
 
 @pytest.fixture
 def search(monkeypatch):
-    """search(error or function): takes the place of the search."""
-
-    def becomes(what):
-        def run(*_, **__):
-            if isinstance(what, BaseException):
-                raise what
-            return what()
-
-        monkeypatch.setattr(feasibility.checking, "check", run)
-
-    return becomes
+    """search(error): takes the place of the search."""
+    return lambda error: monkeypatch.setattr(feasibility.checking, "check", Mock(side_effect=error))
 
 
 def test_a_bug_says_that_it_is_one(search, monkeypatch, capsys):

@@ -2,12 +2,11 @@
 
 from dataclasses import replace
 
-import mesh_patches
 import numpy as np
 import plain
 import pytest
 import referee
-from mesh_patches import in_cells_of
+from mesh_patches import bent, in_cells_of
 
 import coverable
 from coverable import Answer, Search, Task, greedy_check, load_robot, mesh, piecewise, sphere, torus
@@ -76,10 +75,9 @@ def test_the_replay_of_a_tree_judges_between_jcells():
 
 def test_creases_are_named_and_not_crossed():
     task = Task(0.005, 20, tolerance=1e-3)
-    u, v, faces = mesh_patches.grid(8, 8)
-    z = 0.2 + np.tan(np.radians(17.0)) * np.minimum(0.4 * u, 0.4 - 0.4 * u)
-    roof = TriangleMesh(np.column_stack([0.35 + 0.4 * u, 0.4 * v - 0.2, z]), faces)
-    roof = mesh(roof, side="outside").cells(count=12)
+    slope = 0.4 * np.tan(np.radians(17.0))
+    roof = bent(lambda u, v: (0.35 + 0.4 * u, 0.4 * v, 0.2 + slope * np.minimum(u, 1 - u)), 8, 8)
+    roof = mesh(TriangleMesh(*roof), side="outside", position=(0, -0.2, 0)).cells(count=12)
     search = Search(method="greedy", step_deg=0.5, cap=300, starts=1)
     verdict = greedy_check(UR5, roof, task, search)
     assert verdict.answer is Answer.INFEASIBLE

@@ -16,6 +16,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 import study_works
 from jobs import case_named, run_coverable, verdict_named
@@ -197,24 +198,12 @@ def stored(path) -> int:
         return len(store)
 
 
-def processes() -> dict[int, int]:
-    """The parent of each process that has not ended."""
-    found = {}
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        with suppress(OSError):
-            fields = path.read_text().rpartition(")")[2].split()
-            found |= {int(path.parent.name): int(fields[1])} if fields[0] != "Z" else {}
-    return found
-
-
-def children_of(pid: int) -> set[int]:
-    return {child for child, parent in processes().items() if parent == pid}
-
-
-def wait_until_gone(pids) -> None:
+def wait_until_gone(processes) -> None:
     """Until there are no such processes, but for their remains."""
-    while pids & processes().keys():
-        time.sleep(0.01)
+    for one in processes:
+        with suppress(psutil.NoSuchProcess):
+            while one.status() != psutil.STATUS_ZOMBIE:
+                time.sleep(0.01)
 
 
 @pytest.fixture(scope="module")
@@ -239,10 +228,10 @@ def test_the_command_killed_and_run_again(in_peace, tmp_path) -> None:
     """What was kept stays, workers end with their parent, and the table is that of one run."""
     study, text = in_peace
     before = set(multiprocessing.active_children())
-    path, held, orphans = tmp_path / "a.study", [], set[int]()
+    path, held, orphans = tmp_path / "a.study", [], []
     for count in (0, 1):
         with stopped(study, tmp_path, count) as process:
-            orphans |= children_of(process.pid)
+            orphans += psutil.Process(process.pid).children()
             process.kill()
         held.append(stored(path))
         assert not (tmp_path / "a.csv").exists()
@@ -261,7 +250,7 @@ def test_the_command_killed_and_run_again(in_peace, tmp_path) -> None:
 def test_ctrl_c_stores_and_leaves_no_worker(in_peace, tmp_path) -> None:
     """A terminal sends it to the workers too: neither they nor their parent write a traceback."""
     with stopped(in_peace[0], tmp_path, 1) as process:
-        children = children_of(process.pid)
+        children = psutil.Process(process.pid).children()
         os.killpg(process.pid, signal.SIGINT)
     held = stored(tmp_path / "a.study")
     assert 0 < held < 12

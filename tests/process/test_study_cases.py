@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bad_input import sheet
-from mesh_writers import stl_of
+from mesh_patches import bent
+from mesh_writers import off, stl_of
 
 from coverable import Case, Pose, Store, open_workers, run_tasks
 from feasibility.placement.trials import evaluator_of_study
@@ -142,11 +143,8 @@ def test_what_cannot_be_read_is_left_to_the_task(folder: Path, kind: str, fault:
 
 def test_a_mesh_cut_once_and_placed_is_the_mesh_cut_in_place(tmp_path) -> None:
     """To the last bit: so a study says what `check` says."""
-    vertices = [(x, y, 0.1 * x * y) for x in (0, 0.1, 0.2) for y in (0, 0.1, 0.2)]
-    faces = [f for a in (0, 1, 3, 4) for f in ((a, a + 3, a + 1), (a + 1, a + 3, a + 4))]
-    rows = ["OFF", f"{len(vertices)} {len(faces)} 0"]
-    rows += [" ".join(map(str, vertex)) for vertex in vertices]
-    (tmp_path / "a.off").write_text("\n".join(rows + [f"3 {a} {b} {c}" for a, b, c in faces]))
+    saddle = bent(lambda u, v: (0.2 * u, 0.2 * v, 4e-3 * u * v), 2, 2)
+    (tmp_path / "a.off").write_bytes(off(*saddle))
     rng = np.random.default_rng(2)
     for k, cells in enumerate((5, 5, '"auto"')):
         position, rpy = rng.normal(size=3).tolist(), rng.uniform(-180, 180, size=3).tolist()

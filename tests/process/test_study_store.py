@@ -28,11 +28,9 @@ def facts(found: dict[str, Row]) -> dict[str, tuple]:
     return {key: (r.key, r.parameters, r.status, r.result, r.seconds) for key, r in found.items()}
 
 
-def run_sql(path, *programs: str) -> None:
+def run_sql(path, program: str) -> None:
     with closing(sqlite3.connect(path)) as base:
-        for program in programs:
-            base.execute(program)
-        base.commit()
+        base.executescript(program)
 
 
 def test_what_is_kept_is_found_also_by_two_at_a_time(tmp_path) -> None:
@@ -183,8 +181,7 @@ def copied(good, tmp_path):
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_a_store_that_no_study_has_written_is_refused(program, good, tmp_path) -> None:
     path = copied(good, tmp_path)
-    with closing(sqlite3.connect(path)) as base:
-        base.executescript(PROGRAMS[program])
+    run_sql(path, PROGRAMS[program])
     assert ("is damaged (CHECK" in refused(good, path)) == (program == "no status")
 
 

@@ -5,7 +5,6 @@ keys and replaces some. Stored problems of the oracles are questions too, by fil
 "puma560 17".
 """
 
-import csv
 import json
 import tempfile
 import tomllib
@@ -69,12 +68,10 @@ def known(name: str) -> str | None:
     one = _stored(file)[int(number)]
     if "feasible" in one:
         return "feasible" if one["feasible"] else "infeasible"
-    if file == "between_curves":
+    if file in ("between_curves", "planted_rolls"):
         return "feasible"
     if file.endswith("_apart"):
         return "not infeasible" if one["tight_feasible"] else None
-    if file == "planted_rolls":
-        return "feasible"
     if file == "by_a_hair":
         return "not infeasible" if one["share"] < 1.0 else "not feasible"
     return "not infeasible"
@@ -92,7 +89,7 @@ def tables_of(name: str) -> dict[str, Any]:
     file, _, number = name.rpartition(" ")
     if file in STORED:
         one = _stored(file)[int(number)]
-        return one["tables"] if "tables" in one else _of_problem(file.split("_")[0], one)
+        return one["tables"] if "tables" in one else of_problem(file.split("_")[0], one)
     if name not in QUESTIONS:
         return {k: v for k, v in load_case(name).to_tables().items() if k != "search"}
     made, own = _merged(name), QUESTIONS[name]
@@ -111,6 +108,10 @@ def _merged(name: str) -> dict[str, Any]:
             made[title] = {**made.get(title, {}), **own[title]}
     made["robot"] = {k: v for k, v in (made["robot"] | own.get("limit", {})).items() if v != ""}
     return made
+
+
+def built(tables: dict[str, Any]) -> Any:
+    return Case.from_toml(tomli_w.dumps(tables)).build()
 
 
 @cache
@@ -135,8 +136,8 @@ def form_of(name: str) -> Any:
     """The surface of a question for the referee; of points and poses the patch they are of."""
     how = QUESTIONS.get(name, {}).get("as", {})
     if how.get("kind") in ("grid", "poses", "snake"):
-        case = Case.from_toml(tomli_w.dumps(_merged(name)))
-        return None if "tilt_deg" in how else plain.surface_of(case.build().cells.surface)
+        patch = built(_merged(name)).cells.surface
+        return None if "tilt_deg" in how else plain.surface_of(patch)
     return plain.surface_of(question(name).cells.surface)
 
 
@@ -145,7 +146,7 @@ def _stored(file: str) -> list[dict[str, Any]]:
     return json.loads((HERE / f"{file}.json").read_text("utf-8"))
 
 
-def _of_problem(arm: str, one: dict[str, Any]) -> dict[str, Any]:
+def of_problem(arm: str, one: dict[str, Any]) -> dict[str, Any]:
     """The tables of an oracle's problem: angles are in degrees there."""
     arm = "puma560" if arm == "between" else arm
     angles = {"plane": (), "sphere": ("u", "v")}.get(one["kind"], ("u",))
@@ -153,11 +154,8 @@ def _of_problem(arm: str, one: dict[str, Any]) -> dict[str, Any]:
     surface |= {f"{k}_deg" if k in angles else k: one[k] for k in ("u", "v")}
     surface |= {key: one[key] for key in ("position", "rpy_deg", "side", "cells")}
     task = {key: one[key] for key in ("standoff", "cone_deg")}
-    return {
-        "robot": {"name": arm, "limits_deg": one["limits_deg"]},
-        "surface": surface,
-        "task": task,
-    }
+    robot = {"name": arm, "limits_deg": one["limits_deg"]}
+    return {"robot": robot, "surface": surface, "task": task}
 
 
 # Surfaces that come as files: made of the patch that a question has.
@@ -174,9 +172,7 @@ def _as_file(tables: dict[str, Any], how: dict[str, Any]) -> dict[str, Any]:
         return tables | {
             "surface": kept | {"kind": "mesh", "file": f"{path.stem}.stl", "scale": 1.0}
         }
-    cells = Case.from_toml(tomli_w.dumps(tables), name="a patch").build().cells
-    form = plain.surface_of(cells.surface)
-    local = plain.at_home(form)
+    local = plain.at_home(plain.surface_of(built(tables).cells.surface))
     made = {key: surface[key] for key in ("side", "position", "rpy_deg") if key in surface}
     made["side"] = surface.get("side", "inside")
     if kind == "mesh":
@@ -200,10 +196,8 @@ def _as_file(tables: dict[str, Any], how: dict[str, Any]) -> dict[str, Any]:
         if "tilt_deg" in how:  # tool axes of their own
             tilt = np.radians(how["tilt_deg"])
             rows = np.hstack([rows, np.tile([np.sin(tilt), 0.0, -np.cos(tilt)], (len(rows), 1))])
-        with path.with_suffix(".csv").open("w", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(["x", "y", "z", "nx", "ny", "nz", "ax", "ay", "az"][: rows.shape[1]])
-            writer.writerows(rows.tolist())
+        head = ",".join(["x", "y", "z", "nx", "ny", "nz", "ax", "ay", "az"][: rows.shape[1]])
+        np.savetxt(path.with_suffix(".csv"), rows, "%.17g", ",", header=head, comments="")
         made |= {"kind": "poses", "file": f"{path.stem}.csv", "units": "m"}
         made |= {"neighbours": how["neighbours"]} if "neighbours" in how else {}
     return tables | {"surface": made}

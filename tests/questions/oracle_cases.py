@@ -2,11 +2,18 @@
 
 A `net` is the cells' centres and straight lines between neighbours: where a search from centre to
 centre can be. A `patch` is a fine grid over whole cells: wherever a tool could go on the surface.
+
+Stored problems were drawn at random, and kept only where the answer stays the same on both domains,
+at two resolutions, and with cone, limits and place of the surface a little tighter, wider and
+elsewhere; those of "apart" are without that filter, with the oracles' answers to a little tighter
+and wider ones.
 """
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -82,15 +89,17 @@ def _pairs(nu: int, nv: int) -> Ints:
     return np.concatenate([np.stack([a.ravel(), b.ravel()], 1) for a, b in found])
 
 
-def _middles(limits: Floats, count: int) -> Floats:
-    return np.asarray(limits[0] + (limits[1] - limits[0]) * (np.arange(count) + 0.5) / count)
+def _middles(problem: Problem, refine: int) -> Floats:
+    """(S, 2) middles of `refine` x `refine` parts of every cell, row by row."""
+    lines = []
+    for (low, high), count in zip(problem.ranges, problem.cells, strict=True):
+        lines.append(low + (high - low) * (np.arange(count * refine) + 0.5) / (count * refine))
+    return np.stack(np.meshgrid(*lines, indexing="ij"), -1).reshape(-1, 2)
 
 
 def patch(problem: Problem, refine: int) -> Domain:
     """A grid of `refine` x `refine` samples a cell (odd: the centres are among them)."""
-    (nu, nv), (u_range, v_range) = problem.cells, problem.ranges
-    u, v = _middles(u_range, nu * refine), _middles(v_range, nv * refine)
-    uv = np.stack(np.meshgrid(u, v, indexing="ij"), -1).reshape(-1, 2)
+    (nu, nv), uv = problem.cells, _middles(problem, refine)
     at = np.arange(len(uv)).reshape(nu * refine, nv * refine)
     half = refine // 2
     return Domain(uv, _pairs(*at.shape), at[half::refine, half::refine].ravel())
@@ -98,11 +107,8 @@ def patch(problem: Problem, refine: int) -> Domain:
 
 def net(problem: Problem, pieces: int) -> Domain:
     """Centres, and the lines between neighbours cut into so many pieces."""
-    (nu, nv), (u_range, v_range) = problem.cells, problem.ranges
-    centres = np.stack(
-        np.meshgrid(_middles(u_range, nu), _middles(v_range, nv), indexing="ij"), -1
-    ).reshape(-1, 2)
-    a, b = _pairs(nu, nv).T
+    centres = _middles(problem, 1)
+    a, b = _pairs(*problem.cells).T
     part = np.arange(1, pieces)[:, None] / pieces
     between = centres[a, None] * (1.0 - part) + centres[b, None] * part
     inner = len(centres) + np.arange(len(a) * (pieces - 1)).reshape(len(a), -1)
@@ -116,6 +122,16 @@ class Answer(NamedTuple):
     feasible: bool  # One component covers every cell
     covered: int  # Cells of the best single component
     reachable: int  # Cells that some component covers
+
+
+def read(arm: str) -> list[tuple[Problem, Answer]]:
+    """The stored problems of an arm, feasible ones first, then those with cells out of reach, then
+    those that fall apart, then those that a search once got wrong."""
+    found = []
+    for case in json.loads(Path(__file__).with_name(f"{arm}.json").read_text("utf-8")):
+        said = Answer(*(case.pop(field) for field in Answer._fields))
+        found.append((Problem.read(case), said))
+    return found
 
 
 def answer(cells: int, cell: Ints, component: Ints) -> Answer:

@@ -135,9 +135,9 @@ def _components(spans: Floats, arm: Ints, links: Ints) -> tuple[NDArray[np.int32
 
 
 def _turns(limits: Floats) -> Ints:
-    """(W, 3) whole turns that an angle of [lower, lower + 2 pi) may have on top, per joint."""
-    counts = np.maximum(np.ceil((limits[:3, 1] - limits[:3, 0]) / TAU - 1e-12), 1).astype(int)
-    return np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), -1).reshape(-1, 3)
+    """(W, n) whole turns that an angle of [lower, lower + 2 pi) may have on top, per joint."""
+    counts = np.maximum(np.ceil((limits[:, 1] - limits[:, 0]) / TAU - 1e-12), 1).astype(int)
+    return np.array(list(np.ndindex(*counts)))
 
 
 def _fold_samples(problem: Problem, domain: Domain) -> tuple[Domain, Ints]:
@@ -174,7 +174,7 @@ def fibres(problem: Problem, domain: Domain, folds: Ints, row_step: float) -> Fi
     points, approaches = problem.targets(*domain.uv.T)
     theta = limits[:3, 0] + (arms(points) - limits[:3, 0]) % TAU
     reached = (slack(points) >= -1e-9).all(axis=-1)
-    turns = _turns(limits)
+    turns = _turns(limits[:3])
     real = theta[:, :, None, :] + TAU * turns
     usable = reached[:, None, None] & (real <= limits[:3, 1]).all(axis=-1)
 

@@ -11,7 +11,7 @@ neighbouring samples are joined where joints stay continuous; elbows meet where 
 import numpy as np
 from numpy.typing import NDArray
 from oracle_cases import Answer, Floats, Ints, Problem, answer, net
-from puma_oracle import TAU, _rows
+from puma_oracle import TAU, _rows, _turns
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
@@ -106,9 +106,7 @@ def solve(problem: Problem) -> Answer:
     step = float(np.radians(np.clip(problem.cone_deg / STEPS, 2.0, 5.0)))
     rows = _rows(problem.limits[4], step)
     columns = np.arange(np.ceil(TAU / step)) * TAU / np.ceil(TAU / step)
-    counts = np.ceil((upper - problem.limits[:4, 0]) / TAU - 1e-12)
-    turns = np.stack(np.meshgrid(*map(np.arange, np.maximum(counts, 1)), indexing="ij"), -1)
-    turns = turns.reshape(-1, 4)
+    turns = _turns(problem.limits[:4])
     place, theta = _places(problem, points, approaches, rows, columns)
     component = _components(place, theta, upper, turns, domain.links).reshape(-1, len(turns))
     cell, found = [], []

@@ -5,6 +5,7 @@ import pytest
 import trimesh
 from bounds import holds
 from foreign_clearances import distance_from_hull
+from referee import unit
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
@@ -24,12 +25,10 @@ def random_bodies():
     for k in range(30):
         size = 10.0 ** rng.uniform(-3, 2)
         points = rng.normal(size=(int(rng.integers(4, 900)), 3))
-        if k % 3 == 1:
-            points /= np.linalg.norm(points, axis=1, keepdims=True)
+        if k % 3 == 1:  # lenses and needles, whose furthest points are beyond an edge of the hull
+            points = unit(points) * 10.0 ** rng.uniform(-2.5, 0, 3)
         if k % 3 == 2:
             points = np.clip(points, -1, 1) * rng.uniform(1e-3, 1, 3)
-        if k % 3 == 1:  # lenses and needles, whose furthest points are beyond an edge of the hull
-            points *= 10.0 ** rng.uniform(-2.5, 0, 3)
         yield size * points @ Rotation.random(random_state=k).as_matrix() + rng.normal(size=3)
 
 
@@ -72,8 +71,7 @@ def test_what_is_flat_gets_a_hair():
 def test_balls_capsules_and_boxes_are_exact(shape):
     """In every direction the hull reaches as far as the shape does."""
     vertices, radius, _ = hull_of(shape)
-    for d in np.random.default_rng(5).normal(size=(200, 3)):
-        d /= np.linalg.norm(d)
+    for d in unit(np.random.default_rng(5).normal(size=(200, 3))):
         match shape:
             case Sphere(r):
                 reach = r

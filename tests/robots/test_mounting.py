@@ -25,10 +25,7 @@ CLOSE = {"rtol": 0, "atol": 1e-12}
 
 
 def matrix(pose):
-    placed = np.eye(4)
-    placed[:3, :3] = Rotation.from_euler("xyz", pose[1], degrees=True).as_matrix()
-    placed[:3, 3] = pose[0]
-    return placed
+    return referee.placement(pose[0], np.radians(pose[1]))
 
 
 def tool_placement(robot, q):

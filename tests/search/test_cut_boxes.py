@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from plain import tools
 from random_arms import rail_arm, random_arm, random_configuration, tilted, turn_onto
+from referee import unit
 from samples import sampled, seeds
 from search_kernels import contracted
 
@@ -60,8 +61,7 @@ def known_point(arm, kind, rng):
     task = Task(standoff, cone_deg, tolerance)
     cells = surface.cells(4, 5)
     cell, targets = int(rng.integers(len(cells))), task.targets(cells)
-    offset = rng.normal(size=3)
-    offset *= 0.999 * task.effective_tolerance / np.linalg.norm(offset)
+    offset = 0.999 * task.effective_tolerance * unit(rng.normal(size=3))
     approach = tilted(axis, 0.9999 * task.cone, rng)
     turn = turn_onto(targets.approaches[cell], approach, rng)
     surface = surface.moved(turn, point + offset - turn @ targets.points[cell])

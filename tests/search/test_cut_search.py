@@ -1,35 +1,32 @@
 """The prover on stored problems with a known answer, whatever their surface is made of."""
 
 from dataclasses import replace
-from itertools import count
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from asked import question
 from cut_attempts import nothing, prove, proved_wrongly
-from random_cases import built, read
+from oracle_cases import read
 from samples import sampled, seeds, spread
 
-import coverable
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.proofs.branching import branch_and_bound
 from feasibility.roadmap.proofs.ruling import Ruling
 
 
 def stored(arm, feasible):
-    """The stored problems of an arm that are feasible, or fall apart with every cell in reach."""
-    found = [(p, truth) for p, truth in read(arm) if truth.feasible == feasible]
-    return [p for p, t in found if feasible or t.reachable == p.cells[0] * p.cells[1]]
-
-
-def case(arm, problem):
-    return built(problem, coverable.load_robot(arm))
+    """The stored questions of an arm that are feasible, or fall apart with every cell in reach."""
+    found = [(k, p, truth) for k, (p, truth) in enumerate(read(arm)) if truth.feasible == feasible]
+    wanted = [k for k, p, t in found if feasible or t.reachable == p.cells[0] * p.cells[1]]
+    return [question(f"{arm} {k}")[2:5] for k in wanted]
 
 
 @pytest.fixture(scope="module", params=[("puma560", 9), ("ur5", 2)], ids=lambda p: p[0])
 def proved(request):
     """Some stored disconnected cases, proved."""
     arm, every = request.param
-    return [prove(*case(arm, problem)) for problem in stored(arm, feasible=False)[::every]]
+    return [prove(*problem) for problem in stored(arm, feasible=False)[::every]]
 
 
 def test_cases_that_fall_apart_are_proved_and_proved_again(proved):
@@ -68,22 +65,16 @@ def test_a_feasible_case_is_never_proved(arm, few, newton, seed):
     """However its roadmap is broken: branch and bound has to refuse, with Newton and without."""
     rng, problems = np.random.default_rng(2 + seed), stored(arm, feasible=True)
     some = spread(problems, few)
-    wrong = [proved_wrongly(*case(arm, problem), rng, newton) for problem in some]
+    wrong = [proved_wrongly(*problem, rng, newton) for problem in some]
     assert wrong.count(False) >= 3
     assert True not in wrong
 
 
 def test_a_budget_is_kept_and_ticks_may_end_an_attempt():
-    problem = case("ur5", stored("ur5", feasible=False)[2])
-    proving = prove(*problem, budget=200, attempts=2)
+    proving = prove(*stored("ur5", feasible=False)[2], budget=200, attempts=2)
     assert proving.tree is None
     assert proving.attempt.boxes <= 200
-    ticks = count()
-
-    def tick():
-        if next(ticks) == 3:
-            raise KeyboardInterrupt
-
+    tick = Mock(side_effect=[None, None, None, KeyboardInterrupt])
     with pytest.raises(KeyboardInterrupt):
         proving.prover.attempt(proving.components, 100_000, tick)
     assert 0 < proving.prover.attempt(proving.components, 500, nothing).boxes <= 500

@@ -1,5 +1,8 @@
 """The clearance that the search compiles: what it calls clear is clear for coal at every sample."""
 
+from collections import defaultdict
+from itertools import product
+
 import coal
 import numpy as np
 import pinocchio as pin
@@ -7,7 +10,7 @@ import pytest
 import trimesh
 from arm_urdfs import joint
 from numpy.typing import NDArray
-from random_arms import planar_arm, robot_of
+from random_arms import between, planar_arm, robot_of, seen
 from samples import sampled, spread
 from search_kernels import Clearance
 
@@ -16,7 +19,8 @@ from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.kernels import link_frames
 from feasibility.collisions.kernels.tables import GROUPS, row, views
 from feasibility.collisions.problem_bodies import Bodies, Pair, Soup
-from robots.shapes.bodies import Polytope
+from robots.shapes.bodies import Polytope, Triangles
+from robots.shapes.coal_shapes import coal_hull, coal_shape
 
 LENGTH, RADIUS = 0.3, 0.03  # m, of each link, a capsule along x
 chord_deviation, place_bodies = link_frames.chord_deviation, link_frames.place_bodies
@@ -67,48 +71,28 @@ class CoalScene:
     """The same polytopes and soups as coal sees them, placed by Pinocchio."""
 
     def __init__(self, robot: Robot, bodies: Bodies) -> None:
-        self.robot, self.bodies = robot, bodies
-        self.data = robot.model.createData()
-        self.shapes: dict[str, list[tuple[int, coal.CollisionGeometry, float]]] = {}
+        self.robot, self.bodies, self.data = robot, bodies, robot.model.createData()
+        self.shapes = defaultdict(list)
         for body in bodies.polytopes:
-            shape = (body.joint, _convex(body.vertices), body.radius)
-            self.shapes.setdefault(body.owner, []).append(shape)
+            shape, _ = coal_hull(body.vertices)
+            self.shapes[body.owner].append((body.joint, shape, body.radius))
         for soup in bodies.soups:
-            self.shapes.setdefault(soup.owner, []).append((0, _tree(soup.triangles), 0.0))
+            corners = soup.triangles.reshape(-1, 3)
+            mesh = Triangles(corners, np.arange(len(corners)).reshape(-1, 3), soup.closed)
+            self.shapes[soup.owner].append((0, coal_shape(mesh), 0.0))
 
     def distances(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
         """(P,) m, of all pairs at q; of hulls negative where they overlap."""
         pin.forwardKinematics(self.robot.model, self.data, q)
-        return np.array([self._distance(p.first, p.second) for p in self.bodies.pairs])
-
-    def _distance(self, first: str, second: str) -> float:
-        least = np.inf
-        for joint_a, shape_a, radius_a in self.shapes[first]:
-            for joint_b, shape_b, radius_b in self.shapes[second]:
-                result, asked = coal.DistanceResult(), coal.DistanceRequest(True)
-                a, b = self._pose(joint_a), self._pose(joint_b)
-                apart = coal.distance(shape_a, a, shape_b, b, asked, result)
-                least = min(least, apart - radius_a - radius_b)
-        return float(least)
-
-    def _pose(self, joint: int) -> coal.Transform3s:
-        place = self.data.oMi[joint]
-        return coal.Transform3s(place.rotation, place.translation)
-
-
-def _convex(vertices: NDArray[np.float64]) -> coal.CollisionGeometry:
-    points = coal.StdVec_Vec3s()
-    points.extend(list(vertices))
-    return coal.Convex.convexHull(points, False, None)
-
-
-def _tree(triangles: NDArray[np.float64]) -> coal.BVHModelOBBRSS:
-    model = coal.BVHModelOBBRSS()
-    model.beginModel(len(triangles), 3 * len(triangles))
-    for corners in triangles:
-        model.addTriangle(*corners)
-    model.endModel()
-    return model
+        poses = [coal.Transform3s(at.rotation, at.translation) for at in self.data.oMi]
+        asked, found = coal.DistanceRequest(True), []
+        for pair in self.bodies.pairs:
+            shapes = product(self.shapes[pair.first], self.shapes[pair.second])
+            found.append(min(
+                coal.distance(a, poses[i], b, poses[k], asked, coal.DistanceResult()) - r - s
+                for (i, a, r), (k, b, s) in shapes
+            ))  # fmt: skip
+        return np.array(found)
 
 
 def needed(bodies):
@@ -278,13 +262,8 @@ def test_no_point_moves_further_nor_leaves_its_chord_further_than_bounded():
 
 def _moved(robot, body, inner, q0, q1):
     """How far vertices move, seen from a joint, and how far they leave their chords."""
-    data, track = robot.model.createData(), []
-    shares = np.linspace(0.0, 1.0, 21)
-    for s in shares:
-        pin.forwardKinematics(robot.model, data, q0 + s * (q1 - q0))
-        pose = data.oMi[inner].inverse() * data.oMi[body.joint]
-        track.append(body.vertices @ pose.rotation.T + pose.translation)
-    track, s = np.array(track), shares[:, None, None]
+    s, q = between(q0, q1, 20)
+    track, s = seen(robot, q, inner, body.joint, body.vertices), s[:, None, None]
     chord = (1.0 - s) * track[0] + s * track[-1]
     length = np.linalg.norm(np.diff(track, axis=0), axis=2).sum(axis=0)
     return length.max(), np.linalg.norm(track - chord, axis=2).max()

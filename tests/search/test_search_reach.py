@@ -9,6 +9,7 @@ from arm_urdfs import FREE, joint
 from bounds import holds
 from plain import tools
 from random_arms import planar_arm, rail_arm, random_arm, random_configuration, robot_of
+from referee import unit
 from search_kernels import Motions, ruled
 
 from coverable import Task, load_robot, plane
@@ -49,8 +50,7 @@ def covered(rng, robot, task):
     """A configuration at random, and a target that it just covers: point, approach."""
     q = random_configuration(robot, rng)
     (point,), (axis,) = tools(robot, q[None])
-    offset = rng.normal(size=3)
-    offset *= 0.999 * task.tolerance / np.linalg.norm(offset)
+    offset = 0.999 * task.tolerance * unit(rng.normal(size=3))
     return q, point + offset, random_arms.tilted(axis, 0.9999 * task.cone, rng)
 
 
@@ -111,7 +111,7 @@ def test_no_box_loses_the_roll_of_a_place_in_it():
             half[rng.random(n) < 0.5] = 0.0
             d = half * np.clip(rng.uniform(-2.0, 2.0, n), -1.0, 1.0)
             b = tools(robot, q[None])[1][0] + rng.choice([1e-3, 0.1]) * rng.normal(size=3)
-            low, high = box.cut_by_roll(q, half, d, b / np.linalg.norm(b))
+            low, high = box.cut_by_roll(q, half, d, unit(b))
             lost += bool((low > d + 1e-9).any() or (high < d - 1e-9).any())
             cut += bool((low > -half).any() or (high < half).any())
     assert lost == 0
@@ -124,9 +124,7 @@ def test_beyond_reach_is_proved(name):
     rng, robot = np.random.default_rng(5), some_arm(name)
     shoulder = robot.model.jointPlacements[1].translation
     for _ in range(10):
-        direction = random_arms.random_turn(rng)[0]
-        if name == "planar":
-            direction = np.array([*direction[:2], 0.0]) / np.linalg.norm(direction[:2])
+        direction = unit(rng.normal(size=3) * [1.0, 1.0, name != "planar"])
         cells = one_target(shoulder + 1.02 * robot.reach * direction, -direction, rng)
         assert ruled(robot, cells, Task(0.0, 180, 1e-3), 20_000).ruling is Ruling.PROVED
 

@@ -9,6 +9,7 @@ from arm_urdfs import joint
 from bounds import holds
 from plain import tools
 from random_arms import between, deviation, planar_arm, random_arm, random_configuration, robot_of
+from referee import unit
 from samples import sampled, seeds
 from search_kernels import Motions
 
@@ -100,8 +101,7 @@ def surface_segment(rng, robot, kind, task, offsets, longest, onto):
     (point,), (axis,) = tools(robot, q0[None])
     share = rng.random() if onto is not None else rng.uniform(0.5, 1.0)
     approach = random_arms.tilted(axis, share * min(task.cone, 3.1), rng)
-    offset = rng.normal(size=3)
-    offset *= rng.choice(offsets) * task.tolerance / np.linalg.norm(offset)
+    offset = unit(rng.normal(size=3)) * rng.choice(offsets) * task.tolerance
     turn = random_arms.turn_onto(-sign * normal, approach, rng)
     surface = surface.moved(turn, point + offset - turn @ target)
     q1 = q0 + rng.normal(size=robot.n) * 10.0 ** rng.uniform(-3.0, longest)

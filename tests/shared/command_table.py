@@ -1,8 +1,8 @@
 """The commands of tests/output/commands.toml: each runs once, in one folder for all of them."""
 
+import contextlib
 import io
 import json
-import os
 import shlex
 import tomllib
 import zipfile
@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from jobs import Said, run_coverable
+from mesh_writers import off, plate
 
 TABLE = tomllib.loads(Path(__file__).parents[1].joinpath("output/commands.toml").read_text("utf-8"))
 LINES, NUMBERS, REFUSED, WHOLE = map(TABLE.pop, ("files", "numbers", "refused", "whole"))
@@ -27,15 +28,6 @@ BROKEN = {"empty.stl": b"", "zip.stl": b"PK\x03\x04" + bytes(200), "page.stl": b
           "cut.stl": b"x" * 80 + b"\xff\xff\xff\x7f" + bytes(50)}  # fmt: skip
 
 
-def sheet(count: int = 4, size: float = 0.2) -> str:
-    """A flat square of triangles that looks up, as OFF."""
-    step, row = size / count, count + 1
-    points = [f"{i * step} {j * step} 0" for i in range(row) for j in range(row)]
-    corners = [i * row + j for i in range(count) for j in range(count)]
-    faces = [f"3 {k} {k + a} {k + b}" for k in corners for a, b in ((row, row + 1), (row + 1, 1))]
-    return "\n".join(["OFF", f"{len(points)} {len(faces)} 0", *points, *faces, ""])
-
-
 class Commands:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -44,8 +36,8 @@ class Commands:
             (folder / name).write_text(text)
         for name, content in BROKEN.items():
             (folder / name).write_bytes(content)
-        (folder / "sheet.off").write_text(sheet())
-        (folder / "mm.off").write_text(sheet(size=200.0))
+        for name, size in (("sheet.off", 0.2), ("mm.off", 200.0)):
+            (folder / name).write_bytes(off(*plate(4, 4, size, size)))
 
     def words(self, command: str, name: str) -> list[str]:
         return [command, *shlex.split(TABLE[command][name])]
@@ -62,12 +54,8 @@ class Commands:
         return self.say(words)
 
     def say(self, words: list[str]) -> Said:
-        before = Path.cwd()
-        os.chdir(self.folder)
-        try:
+        with contextlib.chdir(self.folder):
             return run_coverable(*words)
-        finally:
-            os.chdir(before)
 
     def page(self, command: str, name: str) -> str:
         self.run(command, name)

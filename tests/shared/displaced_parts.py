@@ -162,10 +162,8 @@ def attack(arm, robot, cells, task, walk, rng, count):
         stays_clear(scene, here, rng)
     if along.pairings:
         beside = {"surface", *(one.name for one in task.collision.scene)}
-        bodies, part = (
-            Nearer(robot, along.pairings, beside, np.array(margin.pivot)),
-            margin.position,
-        )
+        bodies = Nearer(robot, along.pairings, beside, np.array(margin.pivot))
+        part = margin.position
         row, moved = along.row.clip(max=len(walk.q) - 2), along.balls.moved(part, margin.angle)
         moved = np.array([moved[row == k].max(axis=0) for k in range(row[-1] + 1)])
         most = bodies.by(moved, part, margin.angle)

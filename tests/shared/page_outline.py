@@ -2,6 +2,7 @@
 
 import base64
 import gzip
+import io
 import re
 from collections import Counter
 from html.parser import HTMLParser
@@ -44,11 +45,9 @@ def tracks_of(commands: Any) -> dict[tuple[str, str], tuple[np.ndarray, Any]]:
 
 def unpacked(data: bytes) -> list[dict[str, Any]]:
     """Commands to the viewer, each after its length."""
-    found, at = [], 0
-    while at < len(data):
-        length = int.from_bytes(data[at : at + 4], "little")
-        found.append(umsgpack.unpackb(data[at + 4 : at + 4 + length]))
-        at += 4 + length
+    found, rest = [], io.BytesIO(data)
+    while length := rest.read(4):
+        found.append(umsgpack.unpackb(rest.read(int.from_bytes(length, "little"))))
     return found
 
 

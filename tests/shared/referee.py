@@ -1,6 +1,6 @@
 """Foreign judging: what arms, surfaces and bodies do, computed without any code of the product.
 
-Arms are read from their URDF by xml and numpy; surfaces are their formulas; nearest places on
+Arms are read from their URDF by xml; surfaces are their formulas; nearest places on
 triangles are looked for on each that can have them; distances of bodies are python-fcl's. `judge`
 samples a motion densely and lists what it does wrong. All inputs are plain numbers.
 """
@@ -16,10 +16,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
+import fcl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline, CubicSpline
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 Floats = NDArray[np.float64]
 TAU = 2.0 * np.pi
@@ -30,10 +32,7 @@ SAME = 1e-9  # [m], [rad]: rounding between two computations of one number
 
 def turn(rpy: ArrayLike) -> Floats:
     """(3, 3) Rz(yaw) Ry(pitch) Rx(roll), rad."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    return np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]]) @ about_y @ about_x
+    return Rotation.from_euler("xyz", rpy).as_matrix()
 
 
 def placement(position: ArrayLike = (0, 0, 0), rpy: ArrayLike = (0, 0, 0)) -> Floats:
@@ -43,11 +42,8 @@ def placement(position: ArrayLike = (0, 0, 0), rpy: ArrayLike = (0, 0, 0)) -> Fl
 
 
 def about(axis: ArrayLike, angles: Floats) -> Floats:
-    """(k, 3, 3) turns about a unit axis (Rodrigues)."""
-    x, y, z = np.asarray(axis, float)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    c, s = np.cos(angles)[:, None, None], np.sin(angles)[:, None, None]
-    return np.eye(3) + s * cross + (1.0 - c) * (cross @ cross)
+    """(k, 3, 3) turns about a unit axis."""
+    return Rotation.from_rotvec(np.outer(angles, axis)).as_matrix()
 
 
 def unit(vectors: ArrayLike) -> Floats:
@@ -74,7 +70,9 @@ class Joint(NamedTuple):
 
 
 def _numbers(element: Any, key: str, default: str) -> Floats:
-    return np.array([float(word) for word in (element.get(key) or default).split()])
+    """Of an attribute; what is left out has a default."""
+    words = default if element is None else element.get(key) or default
+    return np.array([float(word) for word in words.split()])
 
 
 def joints_of(path: str | Path) -> list[Joint]:
@@ -82,10 +80,8 @@ def joints_of(path: str | Path) -> list[Joint]:
     found = []
     for element in ElementTree.parse(path).getroot().findall("joint"):
         origin, axis, limit = (element.find(tag) for tag in ("origin", "axis", "limit"))
-        at = np.eye(4)
-        if origin is not None:
-            at = placement(_numbers(origin, "xyz", "0 0 0"), _numbers(origin, "rpy", "0 0 0"))
-        along = np.array([1.0, 0, 0]) if axis is None else _numbers(axis, "xyz", "1 0 0")
+        at = placement(_numbers(origin, "xyz", "0 0 0"), _numbers(origin, "rpy", "0 0 0"))
+        along = _numbers(axis, "xyz", "1 0 0")
         free = limit is None or element.get("type") == "continuous"
         ends = (-np.inf, np.inf)
         if not free:
@@ -493,8 +489,6 @@ class Shape(NamedTuple):
 
 
 def fcl_object(geometry: tuple) -> Any:
-    import fcl
-
     match geometry:
         case ("box", size):
             return fcl.Box(*size)
@@ -536,9 +530,8 @@ def link_bodies(path: str | Path, folders: Sequence[str | Path] = ()) -> dict[st
     found: dict[str, list[Shape]] = {}
     for link in ElementTree.parse(path).getroot().findall("link"):
         for part in link.findall("collision"):
-            origin, at = part.find("origin"), np.eye(4)
-            if origin is not None:
-                at = placement(_numbers(origin, "xyz", "0 0 0"), _numbers(origin, "rpy", "0 0 0"))
+            origin = part.find("origin")
+            at = placement(_numbers(origin, "xyz", "0 0 0"), _numbers(origin, "rpy", "0 0 0"))
             (shape,) = part.find("geometry")
             match shape.tag:
                 case "box":
@@ -573,8 +566,6 @@ class Scene:
         }
 
     def _placed(self, shape: Shape, model: Any, frames: Mapping[str, Floats]) -> Any:
-        import fcl
-
         at = shape.placement if shape.link is None else frames[shape.link][0] @ shape.placement
         if shape.geometry[0] == "halfspace":
             at = at.copy()
@@ -583,8 +574,6 @@ class Scene:
 
     def distances(self, q: ArrayLike, asked: Sequence[int] | None = None) -> Floats:
         """(pairs,) m at one configuration; `TOUCHING` where bodies share a point."""
-        import fcl
-
         frames, found = self._frames(np.atleast_2d(q)), []
         for k in range(len(self.pairs)) if asked is None else asked:
             least = np.inf
@@ -646,9 +635,8 @@ class Asked(NamedTuple):
     tolerance: float
     cone: float  # rad
     roll: tuple[float, float] | None = None  # rad, the least and the largest; None where it is free
-    reference: Floats | None = (
-        None  # (3,) root frame, the axis at a roll of 0; None for where u grows
-    )
+    # (3,) root frame, the axis at a roll of 0; None for where u grows.
+    reference: Floats | None = None
     approach: Floats | None = None  # (3,) unit, all over the surface; None for along the normals
 
 

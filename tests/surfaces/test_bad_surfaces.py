@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from approved import refused
+from bad_input import net_csv
 from readers import npy
 from smooth_probes import same_surface
 from specimens import WEIGHTS, ball, hood, sampled
@@ -218,9 +219,7 @@ def test_a_net_comes_back_from_files_to_the_last_digit(tmp_path):
 def test_grids_come_back_from_files_in_their_units(tmp_path):
     points = sampled(ball, (0.3, 1.0), (0, 1), (4, 5))
     np.save(tmp_path / "dome.npy", 1e3 * points)
-    lines = [f"{i},{j},{x!r},{y!r},{z!r}" for i, row in enumerate((1e3 * points).tolist())
-             for j, (x, y, z) in enumerate(row)]  # fmt: skip
-    (tmp_path / "dome.csv").write_text(NET + "\n".join(lines))
+    (tmp_path / "dome.csv").write_bytes(net_csv((1e3 * points).tolist()))
     for name in ("dome.npy", "dome.csv"):
         np.testing.assert_allclose(coverable.read_grid(tmp_path / name, "mm"), points, atol=1e-15)
     assert coverable.read_grid(tmp_path / "dome.npy").max() > 100.0

@@ -8,8 +8,11 @@ import networkx as nx
 import numpy as np
 import pytest
 from approved import refused
-from mesh_patches import CONNECTED, PATCHES, Mesh, bent, box, grid, islands, joined, sheet, used
+from mesh_patches import CONNECTED, PATCHES, Mesh, bent, box, grid, islands, sheet, used
+from referee import unit
 from samples import sampled, spread
+from trimesh.graph import face_adjacency
+from trimesh.triangles import cross
 
 from coverable import mesh
 from surfaces.meshes.cells.borders import LabelledFaces, outlines
@@ -25,8 +28,7 @@ N = 60
 
 def vectors_of(vertices, faces):
     """(F, 3) m^2, area times normal."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return np.cross(b - a, c - a) / 2
+    return cross(vertices[faces]) / 2
 
 
 def areas_of(vertices, faces):
@@ -48,7 +50,7 @@ class Cut:
         normals = np.zeros_like(self.vertices)
         for k in range(3):
             np.add.at(normals, self.faces[:, k], self.vectors)
-        self.normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        self.normals = unit(normals)
         self.figures = figures(self.vertices, self.faces, self.normals, self.labels)
         self.outlines = outlines(LabelledFaces.of(self.vertices, self.faces, self.labels))
 
@@ -69,7 +71,7 @@ def cut(request) -> Cut:
 
 
 def assert_even(cut: Cut, count: int) -> None:
-    sizes, pairs = np.bincount(cut.labels, minlength=count), joined(cut.faces)
+    sizes, pairs = np.bincount(cut.labels, minlength=count), face_adjacency(cut.faces)
     inner = cut.labels[pairs[:, 0]] == cut.labels[pairs[:, 1]]
     assert len(sizes) == count
     assert sizes.min() > 0
@@ -85,7 +87,7 @@ def assert_even(cut: Cut, count: int) -> None:
 
 def test_cells_are_connected_even_compact_and_complete(cut):
     assert_even(cut, N)
-    pairs = cut.labels[joined(cut.faces)]
+    pairs = cut.labels[face_adjacency(cut.faces)]
     islanded = len(cut.given.faces) == len(islands().faces)
     assert parts_of(pairs[pairs[:, 0] != pairs[:, 1]], N) == (3 if islanded else 1)
     if len(cut.given.faces) == 1:
@@ -125,8 +127,7 @@ def test_centres_are_deep_inside_their_cells(cut):
         np.einsum("nk,nkc->nc", weights, x[own]) for x in (cut.vertices, cut.normals)
     )
     np.testing.assert_allclose(found.centres, points, atol=1e-13)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    np.testing.assert_allclose(found.normals, normals, atol=1e-12)
+    np.testing.assert_allclose(found.normals, unit(normals), atol=1e-12)
     for cell in range(N):
         corners = cut.vertices[cut.faces[cut.labels == cell]]
         ends = np.array([edge for edge, sides in cut.border.items() if sides[0] == cell])

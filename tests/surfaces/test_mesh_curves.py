@@ -34,11 +34,6 @@ def corner() -> TriangleMesh:
     return TriangleMesh(*mesh_patches.used(mesh_patches.Mesh(flat, own)))
 
 
-def box() -> TriangleMesh:
-    made = mesh_patches.box()
-    return TriangleMesh(0.4 * made.vertices, made.faces)
-
-
 def plain(name):
     return lambda: TriangleMesh(*mesh_patches.PATCHES[name]())
 

@@ -13,6 +13,7 @@ import mesh_writers as w
 import numpy as np
 import pytest
 from approved import refused
+from mesh_patches import stacked
 from mesh_writers import GOOD, nested_scene
 
 from surfaces.meshes.mesh_notes import notes_of
@@ -192,7 +193,7 @@ REFUSED = {
     "point.off": w.off(V * 0, F),
     "straight.off": w.off([(0.1 * k, 0.2 * k, 0.3 * k) for k in range(4)], [(0, 1, 2), (1, 3, 2)]),
     "three.off": w.off(WING, [(0, 4, 1), (0, 4, 2), (0, 4, 3)]),
-    "wall.stl": w.stl(*w.stacked((V, F), WALL)), "moebius.stl": w.stl(*w.strip(twisted=True)),
+    "wall.stl": w.stl(*stacked((V, F), WALL)), "moebius.stl": w.stl(*w.strip(twisted=True)),
     "millimetres.stl": w.stl(V * 1500, F), "twice_scaled.stl": w.stl(V * 1e-3, F),
     "far.off": w.off(0.1 * V + [1e6, 0, 0], F), "overflow.off": w.off(V * 1e308, F),
 }  # fmt: skip
@@ -232,7 +233,7 @@ OTHERS = {
     "needle.off": (w.off([*P, (0.15, -1e-8, 0)], [*G, (0, 12, 9)]), 0.06, 12, 12),
     "mostly_up.off": (w.off(P, [*G[:3, ::-1], *G[3:]]), 0.06, 12, 12),
     "bow_tie.off": (w.off(*w.bow_tie()), 0.01, 2, 6),
-    "pieces.stl": (w.stl(*w.stacked((V, F), (SECOND, TRAY))), CUBE * 11 / 6, 22, 16),
+    "pieces.stl": (w.stl(*stacked((V, F), (SECOND, TRAY))), CUBE * 11 / 6, 22, 16),
     "ring.stl": (w.stl(*w.strip(twisted=False)), 0.864 * np.sin(np.pi / 12), 48, 48),
     "wide.stl": (w.stl(V * 32, F), CUBE * 32**2, 12, 8),
     "tube.off": (w.off(V, np.delete(F, LIDS, axis=0)), CUBE * 2 / 3, 8, 8),

@@ -4,6 +4,7 @@ import mesh_writers as w
 import numpy as np
 import pytest
 from approved import refused
+from mesh_patches import SIDES, stacked
 from samples import sampled, seeds
 from scipy.spatial.transform import Rotation
 
@@ -83,8 +84,7 @@ def vertex_normals(mesh):
 
 def test_blended_normals_do_not_see_how_faces_are_cut():
     """Cutting faces through a corner keeps its normal; those of a folded sheet are unit vectors."""
-    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    crossed = np.array([half for a, b, c, d in quads for half in ([a, b, d], [b, c, d])])
+    crossed = np.array([half for a, b, c, d in SIDES for half in ([a, b, d], [b, c, d])])
     expected = (V - 0.1) / (0.1 * np.sqrt(3))
     for cut in (F, np.roll(F, -1, axis=1), crossed):
         assert np.abs(vertex_normals(TriangleMesh(V, cut)) - expected[cut]).max() < 1e-12
@@ -112,7 +112,7 @@ def test_arrays_that_are_no_mesh_are_refused(approved):
 
 def test_pieces_are_numbered_by_area():
     parts = [(w.cube(size)[0] + [k, 0, 0], F) for k, size in enumerate((0.1, 0.3, 0.2))]
-    assert clean(*w.stacked(*parts)).pieces.tolist() == [2] * 12 + [0] * 12 + [1] * 12
+    assert clean(*stacked(*parts)).pieces.tolist() == [2] * 12 + [0] * 12 + [1] * 12
 
 
 def knotted(rng):

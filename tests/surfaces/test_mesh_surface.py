@@ -11,6 +11,7 @@ import pytest
 from mesh_patches import bent, can, roof
 from part_walks import survivors
 from samples import sampled, seeds
+from smooth_probes import POSE
 from triangle_probes import KINDS, assert_nearest, degenerate, least_distances, scattered
 
 from coverable import mesh
@@ -19,8 +20,6 @@ from surfaces.meshes.facets import facets_of
 from surfaces.meshes.normals import sectors
 from surfaces.meshes.smoothing import smoothed
 from surfaces.meshes.triangle_mesh import TriangleMesh
-
-POSE = {"position": (0.3, -1.2, 0.7), "rpy_deg": (25.0, -40.0, 110.0)}
 
 
 def rough(count=6, seed=2):

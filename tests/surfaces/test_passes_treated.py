@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from mesh_patches import grid, panel_with_hole
+from referee import unit
 from samples import sampled, seeds
 
 from coverable import cylinder, plane
@@ -15,8 +16,7 @@ from surfaces.passes.welded_triangles import WorkingMesh
 
 
 def facing(mesh: WorkingMesh) -> np.ndarray:
-    normals = mesh.doubled_areas
-    return normals / np.linalg.norm(normals, axis=1)[:, None]
+    return unit(mesh.doubled_areas)
 
 
 def lines_of(*rows: np.ndarray, normal=(0.0, 0.0, 1.0)) -> ToolLines:

@@ -1,7 +1,5 @@
 """Faces of STEP files become surfaces in metres, and files that are none become sentences."""
 
-import base64
-import gzip
 import json
 import re
 import subprocess
@@ -11,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from approved import refused
+from page_outline import Page
 
 from coverable import Case, SurfaceError, mesh, step, step_faces
 from coverable.processes import Ended, Limits, run_apart
@@ -272,8 +271,7 @@ def test_show_lists_the_faces_and_draws_them_with_their_numbers(folder, tmp_path
     assert [line.partition(":")[0] for line in lines] == [str(k) for k in range(1, 8)]
     assert lines[2].startswith("3: cylinder, 0.000785 m^2, #ff0000, at 0.0029, 0.0029, 0.025 m")
     text = page.read_text()
-    packed = re.search(r'<script[^>]*id="commands"[^>]*>(.*?)</script>', text, re.DOTALL)[1]
-    drawn = gzip.decompress(base64.b64decode(packed))
+    drawn = Page(text).block("commands")
     for k in range(1, 8):
         assert f'data-path="/faces/{k}"' in text
         assert f"/faces/{k}".encode() in drawn

@@ -91,9 +91,7 @@ def pairs(surface, count, rng):
         return Places(chart, x[0]), Places(np.minimum(chart + rng.integers(0, 2, count), 23), x[1])
     patches = [patch for patch, _ in pieces_of(surface)]
     chart = rng.integers(0, len(patches), count)
-    low, high = (
-        np.array([[patches[k].u_range[e], patches[k].v_range[e]] for k in chart]) for e in (0, 1)
-    )
+    low, high = _limits(patches, chart)
     start = low + rng.uniform(0, 1, (count, 2)) * (high - low)
     reach = 10.0 ** rng.uniform(-4, 0.0, (count, 1))
     end = start + reach * rng.uniform(-1, 1, (count, 2)) * (high - low)

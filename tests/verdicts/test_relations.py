@@ -6,11 +6,10 @@ import numpy as np
 import pinocchio as pin
 import plain
 import pytest
-import tomli_w
-from asked import question, tables_of, verdict_of
+from asked import built, question, tables_of, verdict_of
 from samples import sampled, seeds, spread
 
-from coverable import Case, CauseKind, Obstacle, Robot, check, load_robot
+from coverable import CauseKind, Obstacle, Robot, check, load_robot
 from feasibility.verdict import Answer
 from robots.pinocchio_model import joint_axes
 from surfaces.surface import rotation_from_rpy
@@ -80,10 +79,6 @@ def no_less(narrow, wide):
 def test_a_question_that_asks_less_loses_nothing(narrow, wide):
     no_less(verdict_of(narrow), verdict_of(wide))
     assert verdict_of(wide).statistics["fk"] <= 5 * verdict_of(narrow).statistics["fk"] + 2000
-
-
-def built(tables):
-    return Case.from_toml(tomli_w.dumps(tables)).build()
 
 
 def wider(tables, what, rng):

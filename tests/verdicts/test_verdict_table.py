@@ -16,6 +16,7 @@ import plain
 import pytest
 import referee
 from asked import QUESTIONS, STORED, counted, form_of, known, names, question, stored, verdict_of
+from displaced_parts import derivative
 from samples import EVERYTHING, sampled, seeds, spread
 
 from coverable import Answer, CauseKind, Evidence, Search, check, replay, verify
@@ -199,9 +200,7 @@ def moved_row(verdict, form, asked):
     """The motion with its middle row moved 1.5 tolerances off; None at a singularity."""
     arm, q = plain.arm_of(verdict.robot), verdict.witness.q.copy()
     k = len(q) // 2
-    steps = q[k] + 1e-6 * np.vstack([np.eye(arm.limits.shape[0]), -np.eye(arm.limits.shape[0])])
-    points, _, _ = arm.tool(steps)
-    jacobian = (points[: q.shape[1]] - points[q.shape[1] :]).T / 2e-6
+    (jacobian,) = derivative(arm, q[k : k + 1])
     place = form.over(arm.tool(q[k : k + 1])[0], asked.standoff)[0]
     for sign in (1.0, -1.0):
         moved = q.copy()

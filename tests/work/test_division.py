@@ -12,10 +12,11 @@ import json_of
 import networkx as nx
 import numpy as np
 import pytest
+from asked import question, stored
 from jobs import run_coverable
+from oracle_cases import read
 from plain import assert_motion
 from random_arms import planar_arm
-from random_cases import built, draw, read
 from samples import sampled, spread
 
 import coverable
@@ -34,8 +35,9 @@ BEHIND = coverable.cylinder(0.6, angle_deg=(150, 210), height=(0.1, 0.5), side="
 
 def disconnected_problem(number):
     """A stored problem that falls apart with every cell in reach."""
-    apart = [p for p, t in read("puma560") if not t.feasible and t.reachable == np.prod(p.cells)]
-    return built(apart[number], load_robot("puma560"))
+    asked = zip(stored("puma560"), read("puma560"), strict=True)
+    apart = [n for n, (p, t) in asked if not t.feasible and t.reachable == np.prod(p.cells)]
+    return question(apart[number])[2:5]
 
 
 def assert_division(division):
@@ -113,8 +115,7 @@ def test_the_seam_of_joint_1_costs_a_patch_and_a_full_turn_removes_it():
 
 
 def drawn(arm, number):
-    rng = np.random.default_rng([7, number])
-    return built(draw(rng, arm), load_robot(arm))
+    return question(np.random.default_rng([7, number]).choice(stored(arm)))[2:5]
 
 
 DRAWN = [("puma560", number) for number in range(22)] + [("ur5", number) for number in range(8)]

@@ -5,7 +5,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from foreign_clearances import ForeignScene, samples
+from foreign_clearances import ForeignScene
+from referee import closely
 
 from coverable import Collision, Obstacle, Task, ToolShape, check, divide, load_robot, plane
 from feasibility.certification.collisions.collision_replay import collision_replay
@@ -22,14 +23,10 @@ POST = Obstacle.box("post", (0.1, 0.1, 1.2), position=(0.45, 0.0, 0.6))
 BEHIND = plane(
     (-0.1, 0.1), (-0.2, 0.2), position=(-0.6, 0.0, 0.3), rpy_deg=(0, -90, 0), side="inside"
 )
-POSED = UR5.with_limits(
-    {
-        "shoulder_pan_joint": np.radians([-180, 180]),
-        "shoulder_lift_joint": np.radians([-90, 0]),
-        "elbow_joint": np.radians([0, 150]),
-        "wrist_1_joint": np.radians([-120, 120]),  # not folded back onto the forearm
-    }
-)
+POSTURE = {"shoulder_pan_joint": (-180, 180), "shoulder_lift_joint": (-90, 0),
+           "elbow_joint": (0, 150), "wrist_1_joint": (-120, 120)}  # fmt: skip
+"""The last one is not folded back onto the forearm."""
+POSED = UR5.with_limits({name: np.radians(ends) for name, ends in POSTURE.items()})
 
 
 @cache
@@ -68,7 +65,7 @@ def test_the_move_between_two_patches_goes_around_the_post():
     way = f"through {len(move.via)} configurations (--json has them); bodies at least"
     assert way in text_of(division)
     # fcl agrees, at single configurations.
-    dense = samples(move.waypoints, np.radians(4.0))
+    dense = closely(move.waypoints, np.radians(4.0))
     assert ForeignScene(robot, bodies).least_excess(dense).min() >= -1e-6
     for patch in division.patches:
         assert patch.accepted
@@ -131,7 +128,7 @@ def test_a_tool_that_touches_is_lifted_along_its_axis_and_drags_over_nothing():
         np.testing.assert_allclose(along, np.tile(along[0], (5, 1)), atol=1e-5)
     # fcl agrees: from the lifted tool to the lifted tool nothing is nearer than it may be.
     between = rows[4:-4]
-    assert ForeignScene(UR5, lifted).least_excess(samples(between, np.radians(0.5))).min() >= -1e-6
+    assert ForeignScene(UR5, lifted).least_excess(closely(between, np.radians(0.5))).min() >= -1e-6
     judged = [collision_replay(UR5, bodies, rows), collision_replay(UR5, lifted, between)]
     assert all(one.accepted for one in judged)
     least = min(one.min_clearance for one in judged if one.min_clearance is not None)

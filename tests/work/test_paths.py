@@ -8,8 +8,9 @@ from pathlib import Path
 import networkx as nx
 import numpy as np
 import pytest
+from displaced_parts import singular
 from path_cases import BEST, FEASIBLE, PATCHES, path_of, verdict_of
-from plain import faults_of
+from plain import arm_of, faults_of
 from referee import evenly
 from samples import sampled, seeds, spread
 
@@ -138,19 +139,8 @@ def test_the_figures_of_a_path_measured_again(name):
     assert figures.turn_margin == np.minimum(walk.q - robot.lower, robot.upper - walk.q).min()
     assert figures.slide_margin == np.inf
     assert -1e-9 <= figures.cone_margin <= verdict.task.cone
-    assert figures.singular_value == pytest.approx(_singular_value(robot, walk.q), rel=1e-4)
-
-
-def _singular_value(robot, q, step=1e-6):
-    """The smallest of five singular values, by finite differences of the tool's place."""
-    kinematics, smallest = Kinematics(robot), np.inf
-    for row in q:
-        shifts = np.vstack([step * np.eye(robot.n), -step * np.eye(robot.n)])
-        points, axes = kinematics.tools(row + shifts)
-        both = np.hstack([points / robot.reach, axes])
-        columns = (both[: robot.n] - both[robot.n :]).T / (2 * step)
-        smallest = min(smallest, np.linalg.svd(columns, compute_uv=False)[4])
-    return smallest
+    least = singular(robot, arm_of(robot), walk.q).min()
+    assert figures.singular_value == pytest.approx(least, rel=1e-4)
 
 
 def hand_made(rng, cells, nodes, density, wide=3.0):

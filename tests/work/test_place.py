@@ -6,6 +6,7 @@ import multiprocessing
 from dataclasses import replace
 from functools import cache
 from itertools import count
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from asked import question
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from jobs import PLATE, run_coverable
+from referee import unit
 from samples import sampled, spread
 
 import coverable
@@ -102,15 +104,12 @@ def test_a_surface_moved_away_is_put_back(name, seed):
     assert found.best.margin == again.certificate.placement_margin.position > 0.0
 
 
-def nobody(poses, effort):
-    raise AssertionError("no search should be run")
-
-
 def test_a_region_far_away_is_refused_by_the_bound_alone():
     for name in TEXTS:
         setup = setup_of(name)
         far = Pose.of_surface(setup.cells.surface).values + np.array([3.0, 0, 0, 0, 0, 0])
-        found = place(*setup[:3], region_about(Pose.of_values(far)), setup.search, evaluator=nobody)
+        region, nobody = region_about(Pose.of_values(far)), Mock(side_effect=AssertionError)
+        found = place(*setup[:3], region, setup.search, evaluator=nobody)
         assert (found.answer, found.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)
         assert (found.cause, found.found) == (coverable.CauseKind.OUT_OF_REACH, ())
 
@@ -198,8 +197,7 @@ def test_the_bound_on_a_region_holds_for_its_placements():
     tight = []
     for k in range(40):
         reach, rng = reaches[k % len(reaches)], np.random.default_rng([21, k])
-        far = rng.normal(size=3)
-        far *= rng.uniform(0.8, 1.6) * (reach.reach + 0.3) / np.linalg.norm(far)
+        far = unit(rng.normal(size=3)) * rng.uniform(0.8, 1.6) * (reach.reach + 0.3)
         centre = np.concatenate([far, rng.uniform(-180.0, 180.0, 3)])
         region = region_about(Pose.of_values(centre), rng.uniform(0.0, [0.4] * 3 + [40.0] * 3))
         beyond = reach.beyond(region)

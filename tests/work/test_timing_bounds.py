@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from timed_motions import UR5, at, interpolated
+from timed_motions import UR5, interpolated, motion
 
 from coverable import Trajectory, load_robot, motion_limits
 from feasibility.timing.sampled_trajectory import deviations
@@ -21,8 +21,7 @@ def run_of(name):
     """A smooth motion; one whose samples jump; one whose samples are far apart; two samples."""
     rng = np.random.default_rng(3)
     if name == "even":
-        time = np.sort(np.append(np.arange(0.0, 2.0 + 1e-9, 0.02), 0.1234567))
-        q = at(time, 6)[0]
+        time, q = motion(UR5).time, motion(UR5).q
     elif name == "jumpy":
         time = np.cumsum(rng.uniform(0.004, 0.02, 40))
         q = 0.01 * np.cumsum(rng.normal(size=(40, 6)), axis=0)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from coverable import Robot, list_robots, load_robot
 
+Floats = NDArray[np.float64]
 FREE = (-float("inf"), float("inf"))
 RIGHT_ANGLES = (-np.pi / 2, 0.0, np.pi / 2, np.pi)
 
@@ -86,9 +87,11 @@ def load_text(folder: Path, text: str, **options: object) -> Robot:
     return load_robot(path, **options)
 
 
-def random_q(robot: Robot, rng: np.random.Generator, turns: float = 2.0) -> NDArray[np.float64]:
+def finite_limits(robot: Robot, far: float = 2.0 * np.pi) -> tuple[Floats, Floats]:
+    """The limits (rad, m), and that far where there are none."""
+    return tuple(np.nan_to_num([robot.lower, robot.upper], posinf=far, neginf=-far))
+
+
+def random_q(robot: Robot, rng: np.random.Generator) -> Floats:
     """A configuration inside the limits; free joints turn several times."""
-    far = turns * 2 * np.pi
-    lower = np.where(np.isfinite(robot.lower), robot.lower, -far)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, far)
-    return rng.uniform(lower, upper)
+    return rng.uniform(*finite_limits(robot, 4.0 * np.pi))

@@ -2,6 +2,7 @@
 
 import numpy as np
 from arm_urdfs import joint
+from mesh_patches import box, stacked
 from random_arms import robot_of
 
 from coverable import Obstacle
@@ -41,17 +42,14 @@ def at(x=0.0, y=0.0, z=0.0, rotation=None):
 
 def box_mesh(size, closed=True):
     """A box of 12 triangles about the origin, outward; one is left out where it is not closed."""
-    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-    sides = (0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)
-    faces = np.array([face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))])
-    return Triangles(signs * np.array(size) / 2.0, faces if closed else faces[:-1], closed)
+    corners, faces = box(*size)
+    return Triangles(corners - np.array(size) / 2.0, faces if closed else faces[:-1], closed)
 
 
 def fork():
     """Two arms along x, 0.6 m apart: a U-shaped link whose hull is full."""
     arm, aside = box_mesh((1.0, 0.1, 0.1)), np.array([0.0, 0.35, 0.0])
-    faces = np.vstack([arm.faces, arm.faces + 8])
-    return Triangles(np.vstack([arm.vertices + aside, arm.vertices - aside]), faces, True)
+    return Triangles(*stacked(*((arm.vertices + y * aside, arm.faces) for y in (1, -1))), True)
 
 
 def bodies_of(solids, scene=(), pairs=(), soups=()):

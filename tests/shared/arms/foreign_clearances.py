@@ -5,13 +5,12 @@ from functools import lru_cache
 import numpy as np
 import pinocchio as pin
 from plain import geometry_of
-from referee import Joint, Scene, Shape, closely, fcl_object
+from referee import Joint, Scene, Shape, fcl_object
 from scipy.optimize import nnls
 
 from robots.shapes.bodies import Triangles
 
 cached_model = lru_cache(maxsize=256)(lambda geometry: fcl_object(geometry_of(geometry)))
-samples = closely
 
 
 def distance_from_hull(point, vertices):

@@ -9,6 +9,8 @@ import numpy as np
 import pinocchio as pin
 import trimesh
 from foreign_clearances import ForeignScene
+from random_arms import tilted
+from referee import unit
 
 import coverable
 from coverable import Axis, Cells, Collision, Obstacle, Robot, Task, ToolShape, load_robot, plane
@@ -24,6 +26,7 @@ CLEARANCE = 0.005  # m, that is asked for
 UR5 = load_robot("ur5")
 PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3))
 CELLS = PLATE.cells(1, 1)
+NOZZLE = ToolShape.cylinder(0.01, 0.1, position=(0.0, 0.0, -0.05))
 
 
 @cache
@@ -36,12 +39,6 @@ def arm(name: str) -> Robot:
 def within_a_turn(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """The limits, at most half a turn to either side."""
     return np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
-
-
-def upright(rng: np.random.Generator, size: float) -> np.ndarray:
-    """A vector of that length in any direction."""
-    vector = rng.normal(size=3)
-    return size * vector / np.linalg.norm(vector)
 
 
 def a_plate(rng: np.random.Generator, robot: Robot) -> tuple[Cells, Task]:
@@ -109,11 +106,11 @@ class Over:
         axis = frame.rotation @ self.robot.approach_axis
         onto = pin.Quaternion.FromTwoVectors(axis, self.approach).toRotationMatrix()
         for k in range(count):
-            tilt = np.cross(self.approach, rng.normal(size=3))
-            angle = self.task.cone * (1.0 if k % 2 else np.sqrt(rng.uniform()))
-            tilt *= angle / np.linalg.norm(tilt)
+            tilt = unit(np.cross(self.approach, rng.normal(size=3)))
+            tilt *= self.task.cone * (1.0 if k % 2 else np.sqrt(rng.uniform()))
             turn = pin.exp3(tilt) @ pin.exp3(rng.uniform(-np.pi, np.pi) * self.approach) @ onto
-            off = upright(rng, self.task.effective_tolerance * rng.uniform() ** 0.1)
+            size = self.task.effective_tolerance * rng.uniform() ** 0.1
+            off = size * unit(rng.normal(size=3))
             if scene.clear(pin.SE3(turn, self.point + off - turn @ frame.translation)):
                 return True
         return False
@@ -163,6 +160,15 @@ class ToolPoses(ForeignScene):
         return False
 
 
+def over(
+    *scene: Obstacle, tool: ToolShape = NOZZLE, cone_deg: float = 30.0, clearance: float = 0.0
+) -> Over:
+    """The tool alone, without the links, among objects."""
+    allow = tuple((name, one.name) for name in UR5.link_names for one in scene)
+    asked = Collision(False, False, clearance=clearance, scene=scene, tool=(tool,), allow=allow)
+    return Over.cell(UR5, CELLS, Task(0.02, cone_deg, 0.001, collision=asked))
+
+
 def random_over(seed: int) -> Over:
     """One or two objects near the target, and a tool of one shape; links are left out."""
     rng = np.random.default_rng(seed)
@@ -170,32 +176,25 @@ def random_over(seed: int) -> Over:
     scene = tuple(random_object(rng, f"object{k}", around) for k in range(rng.integers(1, 3)))
     clearance = float(rng.choice([0.0, 0.01]))
     tools = [
-        ToolShape.cylinder(0.01, 0.1, position=(0.0, 0.0, -0.05)),
+        NOZZLE,
         ToolShape.box((0.03, 0.02, 0.1), position=(0.01, 0.0, -0.05)),
         ToolShape.capsule(0.015, 0.08, position=(0.0, 0.0, -0.06)),
         ToolShape.sphere(0.04, position=(0.0, 0.0, -0.05)),
     ]
-    asked = Collision(
-        self_=False, surface=False, clearance=clearance, scene=scene,
-        tool=(tools[int(rng.integers(4))],),
-        allow=tuple((name, one.name) for name in UR5.link_names for one in scene),
-    )  # fmt: skip
-    return Over.cell(UR5, CELLS, Task(0.02, float(rng.uniform(1, 90)), 0.001, collision=asked))
-
-
-def covered_target(rng: np.random.Generator, robot: Robot, q: np.ndarray, cone_deg: float):
-    """A point and an approach that q covers: off by up to 1 mm, and by up to the cone."""
-    points, axes = Kinematics(robot).tools(q[None])
-    tilt = np.cross(axes[0], rng.normal(size=3))
-    tilt *= np.radians(cone_deg) * rng.uniform() / np.linalg.norm(tilt)
-    return points[0] + upright(rng, 0.001 * rng.uniform()), pin.exp3(tilt) @ axes[0]
+    tool, cone_deg = tools[int(rng.integers(4))], float(rng.uniform(1, 90))
+    return over(*scene, tool=tool, cone_deg=cone_deg, clearance=clearance)
 
 
 def planted_over(name: str, seed: int) -> Over | None:
-    """A pose of an arm and a target that it covers, among objects; None if it collides."""
+    """A pose of an arm and a target that it covers, among objects; None if it collides.
+
+    It is off the target by up to 1 mm, and by up to the cone.
+    """
     rng, robot = np.random.default_rng([seed, 1]), arm(name)
     q, cone_deg = rng.uniform(*within_a_turn(robot)), float(rng.uniform(1.0, 60.0))
-    point, approach = covered_target(rng, robot, q, cone_deg)
+    point, axis = Kinematics(robot).tool(q)
+    approach = tilted(axis, np.radians(cone_deg) * rng.uniform(), rng)
+    point = point + 0.001 * rng.uniform() * unit(rng.normal(size=3))
     scene = tuple(random_object(rng, f"object{k}", point) for k in range(rng.integers(1, 4)))
     asked = Collision(surface=False, clearance=float(rng.choice([0.0, 0.005])), scene=scene)
     over = Over(robot, PLATE, Task(0.02, cone_deg, 0.001, collision=asked), point, approach)

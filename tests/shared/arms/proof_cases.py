@@ -7,15 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 from arm_urdfs import joint
+from asked import built, of_problem
 from random_arms import robot_of
 
-from coverable import Cells, Robot, Task, cylinder, hyperboloid, load_robot, plane, sphere
+from coverable import Cells, Robot, Task, plane
 from feasibility.cut_tree import Cut, CutTree, Leaf
 
 STORED = json.loads((Path(__file__).parents[2] / "bounds" / "cut_trees.json").read_text("utf-8"))
 """Problems of an oracle; the last one is feasible and has no tree."""
 QUICK = [number for number, row in enumerate(STORED) if row["quick"]]
-KINDS = {"plane": plane, "sphere": sphere, "cylinder": cylinder, "hyperboloid": hyperboloid}
 FLAT = Task(standoff=0.0, cone_deg=20.0)
 ACROSS = float(np.arccos(0.68))
 """Angle between the first link (1 m) and the line to a tool point 1 m away; second link 0.8 m."""
@@ -79,8 +79,6 @@ def tree_of(plain: list) -> Cut | Leaf:
 def stored_case(index: int) -> Proved:
     """One of the stored trees with its question; the last question without a tree."""
     row = STORED[index]
-    pose = {name: row[name] for name in ("side", "position", "rpy_deg")}
-    cells = KINDS[row["kind"]](*row["size"], row["u"], row["v"], **pose).cells(*row["cells"])
-    robot = load_robot(row["arm"]).with_limits(np.radians(row["limits_deg"]))
+    robot, cells, task, _ = built(of_problem(row["arm"], row))
     tree = CutTree(Leaf(0) if row["tree"] is None else tree_of(row["tree"]))
-    return Proved(robot, cells, Task(row["standoff"], row["cone_deg"]), tree)
+    return Proved(robot, cells, task, tree)

@@ -1,16 +1,15 @@
 """Random arms, surfaces and straight joint segments, and dense sampling by Pinocchio."""
 
 import numpy as np
-from arm_urdfs import RIGHT_ANGLES, arm, joint, random_joints
+from arm_urdfs import RIGHT_ANGLES, Floats, arm, finite_limits, joint, random_joints
 from asked import question
-from numpy.typing import NDArray
+from referee import unit
 
 from coverable import Axis, Robot, Surface, Task, cylinder, hyperboloid, load_robot, plane, sphere
 from robots.from_urdf import robot_from_urdf
+from robots.kinematics import Kinematics
 from robots.urdf.checked_urdf import checked_tree
 from robots.urdf.elements import parse_xml
-
-Floats = NDArray[np.float64]
 
 
 def robot_of(joints: list[str], approach_axis: tuple[float, ...] = (0.0, 0.0, 1.0)) -> Robot:
@@ -36,11 +35,6 @@ def rail_arm(base: str, stroke: tuple[float, float] = (-0.5, 0.8)) -> Robot:
     return load_robot(base, axes=[Axis("rail", "prismatic", (0, 1, 0), limits=stroke)])
 
 
-def finite_limits(robot: Robot) -> tuple[Floats, Floats]:
-    low = np.where(np.isfinite(robot.lower), robot.lower, -2.0 * np.pi)
-    return low, np.where(np.isfinite(robot.upper), robot.upper, 2.0 * np.pi)
-
-
 def random_configuration(robot: Robot, rng: np.random.Generator) -> Floats:
     """A configuration inside the limits; in a third of the cases with joints at round values."""
     low, high = finite_limits(robot)
@@ -57,18 +51,18 @@ def between(q0: Floats, q1: Floats, samples: int) -> tuple[Floats, Floats]:
     return s, q0 + s[:, None] * (q1 - q0)
 
 
-def random_turn(rng: np.random.Generator) -> Floats:
-    q, r = np.linalg.qr(rng.normal(size=(3, 3)))
-    q *= np.sign(np.diag(r))
-    return q if np.linalg.det(q) > 0.0 else -q
+def seen(robot: Robot, q: Floats, a: int, b: int, points: Floats) -> Floats:
+    """Points (k, 3) of joint b as seen from joint a (m, k, 3), at configurations q (m, n)."""
+    frames = Kinematics(robot).joints(q)
+    world = np.einsum("mij,kj->mki", frames.rotations[:, b], points) + frames.points[:, None, b]
+    return np.einsum("mji,mkj->mki", frames.rotations[:, a], world - frames.points[:, None, a])
 
 
 def turn_onto(start: Floats, end: Floats, rng: np.random.Generator) -> Floats:
     """A random rotation (3, 3) that brings one unit vector onto another."""
 
     def frame(z: Floats) -> Floats:
-        x = np.cross(z, rng.normal(size=3))
-        x /= np.linalg.norm(x)
+        x = unit(np.cross(z, rng.normal(size=3)))
         return np.column_stack([x, np.cross(z, x), z])
 
     return frame(end) @ frame(start).T
@@ -76,8 +70,7 @@ def turn_onto(start: Floats, end: Floats, rng: np.random.Generator) -> Floats:
 
 def tilted(axis: Floats, angle: float, rng: np.random.Generator) -> Floats:
     """A unit vector at an angle (rad) from a unit vector, in a random direction."""
-    across = np.cross(axis, rng.normal(size=3))
-    across /= np.linalg.norm(across)
+    across = unit(np.cross(axis, rng.normal(size=3)))
     return np.cos(angle) * axis + np.sin(angle) * across
 
 

@@ -128,8 +128,8 @@ SLIDER = TABLES.with_name("good").joinpath("slider.urdf").read_text()
 NET_POINTS = [[[0.1 * i, 0.1 * j, 0.01 * i * j] for j in range(3)] for i in range(3)]
 
 
-def net_csv() -> bytes:
-    rows = [f"{i},{j},{x!r},{y!r},{z!r}" for i, row in enumerate(NET_POINTS)
+def net_csv(points: Any = NET_POINTS) -> bytes:
+    rows = [f"{i},{j},{x!r},{y!r},{z!r}" for i, row in enumerate(points)
             for j, (x, y, z) in enumerate(row)]  # fmt: skip
     return "\n".join(["row,column,x,y,z", *rows, ""]).encode()
 

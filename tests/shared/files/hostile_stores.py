@@ -31,9 +31,8 @@ def rows(path: Path) -> list[Row]:
 
 
 def put(path: Path, row: Row) -> None:
-    with closing(sqlite3.connect(path)) as base:
+    with closing(sqlite3.connect(path)) as base, base:
         base.execute("INSERT OR REPLACE INTO tasks VALUES (?, ?, ?, ?, ?)", row)
-        base.commit()
 
 
 def allowed(key: str, odd: Any) -> bool:

@@ -5,29 +5,23 @@ import struct
 from collections import defaultdict
 
 import numpy as np
-from mesh_patches import grid
+from mesh_patches import bent, box
 
 from surfaces.meshes.normals import corner_normals
 from surfaces.meshes.triangle_mesh import TriangleMesh
 
 
 def cube(size=0.2):
-    """8 vertices and 12 faces that look outwards."""
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * size
-    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    return corners, np.array([[q[0], *q[k : k + 2]] for q in quads for k in (1, 2)])
+    return box(size, size, size)
 
 
 def plate(nu, nv, width=0.3, height=0.2):
     """A flat grid of nu x nv squares, each cut in two, that looks up."""
-    u, v, faces = grid(nu, nv)
-    return np.stack([width * u, height * v, 0 * u], 1), faces
+    return bent(lambda u, v: (width * u, height * v, 0 * u), nu, nv)
 
 
 def hilly(nu=14, nv=11):
-    vertices, faces = plate(nu, nv)
-    vertices[:, 2] = 0.03 * np.sin(20 * vertices[:, 0]) * np.cos(15 * vertices[:, 1])
-    return vertices, faces
+    return bent(lambda u, v: (0.3 * u, 0.2 * v, 0.03 * np.sin(6 * u) * np.cos(3 * v)), nu, nv)
 
 
 def strip(twisted, count=24):
@@ -45,12 +39,6 @@ def strip(twisted, count=24):
     if twisted:
         b[-1], d[-1] = count, 0
     return vertices, np.concatenate([np.stack([a, c, d], 1), np.stack([a, d, b], 1)])
-
-
-def stacked(*parts):
-    starts = np.cumsum([0] + [len(v) for v, _ in parts])
-    faces = [f + k for (_, f), k in zip(parts, starts, strict=False)]
-    return np.concatenate([v for v, _ in parts]), np.concatenate(faces)
 
 
 def chain_of_caps():
@@ -112,11 +100,10 @@ def ply(vertices, polygons, order="<", header=None):
     )
     body = b""
     for x, y, z in np.asarray(vertices, float).tolist():
-        body += (
-            f"9 {x!r} {y!r} {z!r}\n".encode()
-            if not order
-            else struct.pack(order + "B3d", 9, x, y, z)
-        )
+        if order:
+            body += struct.pack(order + "B3d", 9, x, y, z)
+        else:
+            body += f"9 {x!r} {y!r} {z!r}\n".encode()
     for p in polygons:
         if order:
             body += struct.pack(f"{order}BB{len(p)}i", 7, len(p), *map(int, p))

@@ -100,12 +100,13 @@ def blade(nu: int = 80, nv: int = 40) -> Mesh:
     return bent(shape, nu, nv)
 
 
-def box() -> Mesh:
-    """A closed box of twelve triangles: coarse, with creases of a right angle."""
-    corners = np.array([[x, y, z] for x in (0, 0.8) for y in (0, 0.5) for z in (0, 0.3)])
-    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    faces = [f for a, b, c, d in quads for f in ([a, b, c], [a, c, d])]
-    return Mesh(corners.astype(float), np.array(faces, dtype=np.int64))
+SIDES = (0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)
+
+
+def box(x: float = 0.8, y: float = 0.5, z: float = 0.3) -> Mesh:
+    """A closed box of twelve triangles, two of each of its `SIDES`, with a corner at the origin."""
+    corners = np.array([[i * x, j * y, k * z] for i, j, k in np.ndindex(2, 2, 2)], dtype=float)
+    return Mesh(corners, np.array([f for a, b, c, d in SIDES for f in ((a, b, c), (a, c, d))]))
 
 
 def holed(n: int = 60) -> Mesh:
@@ -151,14 +152,19 @@ def flat_faces(points: Floats, least: float) -> NDArray[np.int64]:
     return faces[abs(turn) > least]
 
 
+def stacked(*parts: tuple[Floats, NDArray[np.int64]]) -> Mesh:
+    """Several in one, beside each other as they are."""
+    starts = np.cumsum([0] + [len(v) for v, _ in parts])
+    faces = [f + k for (_, f), k in zip(parts, starts, strict=False)]
+    return Mesh(np.concatenate([v for v, _ in parts]), np.concatenate(faces))
+
+
 def islands() -> Mesh:
     """Three separate sheets of different sizes."""
     parts = [sheet(20), hood(24, 20), sheet(8)]
     scale, shift = (1.0, 1.0, 0.3), ([0, 0, 0], [2.0, 0, 0], [0, 2.0, 0])
-    vertices = [s * m.vertices + t for m, s, t in zip(parts, scale, shift, strict=True)]
-    starts = np.cumsum([0, *(len(m.vertices) for m in parts)])
-    faces = [m.faces + n for m, n in zip(parts, starts, strict=False)]
-    return Mesh(np.concatenate(vertices), np.concatenate(faces))
+    placed = zip(parts, scale, shift, strict=True)
+    return stacked(*((s * m.vertices + t, m.faces) for m, s, t in placed))
 
 
 def used(mesh: Mesh) -> Mesh:
@@ -220,11 +226,3 @@ def can() -> TriangleMesh:
     wall = [np.column_stack([k, after, 48 + k]), np.column_stack([after, 48 + after, 48 + k])]
     lid = np.column_stack([48 + k, 48 + after, np.full(48, 96)])
     return TriangleMesh(np.vstack([low, high, [[0, 0, 0.1]]]), np.vstack([*wall, lid]))
-
-
-def joined(faces):
-    """(K, 2) pairs of faces that share an edge."""
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    order = np.lexsort(edges.T)
-    same = (edges[order[1:]] == edges[order[:-1]]).all(axis=1)
-    return np.column_stack([order[:-1][same], order[1:][same]]) // 3
