@@ -32,11 +32,6 @@ class Finding:
     witness: Walk | None = None
     """The covering motion, with which as its `seeds` `check` says so; None unless feasible."""
 
-    @property
-    def feasible(self) -> bool:
-        """True when a covering motion is known that the replay accepted."""
-        return self.answer is Answer.FEASIBLE
-
 
 @dataclass(frozen=True, slots=True)
 class Threshold:

@@ -69,8 +69,10 @@ def test_the_replay_of_a_tree_judges_between_jcells():
     assert "the tool axis tilts" in replay_tree(PUMA, RING, narrow, steps, paths).refusal
     swapped = paths[:1] + [replace(path, neighbour=path.cell) for path in paths[1:]]
     assert "in the cell it claims" in replay_tree(PUMA, RING, TASK, steps, swapped).refusal
-    torn = replay_tree(PUMA, RING, TASK, steps, paths[:1] + paths[:0:-1])
-    assert "a path does not begin where its cell was entered" in torn.refusal
+    late = [*paths[:-1], replace(paths[-1], q=paths[-1].q[1:])]
+    for torn in (late, paths[:1] + paths[:0:-1]):
+        refusal = replay_tree(PUMA, RING, TASK, steps, torn).refusal
+        assert "a path does not begin where its cell was entered" in refusal
 
 
 def test_creases_are_named_and_not_crossed():

@@ -17,6 +17,7 @@ import coverable
 from coverable import Collision, PathError, Task, check, coverage_path, motion_limits, trajectory
 from feasibility.certification.collisions.collision_replay import collision_replay
 from feasibility.collisions.asked_bodies import gather
+from feasibility.demands.fast_motions import rate_figures
 from feasibility.timing.path_timing import within_limits
 from feasibility.timing.smooth_curve import control_points
 from feasibility.timing.speed_limits import past_limits, used
@@ -153,6 +154,7 @@ def test_over_one_cell_the_arm_rests():
     assert (run.at(np.array([0.0, 1.0])) == run.q).all()
     assert not run.at(np.array([0.0, 1.0]), order=1).any()
     assert not used(UR5, run, motion_limits(UR5, SPEED)).velocity.any()
+    assert rate_figures(verdict).largest == np.inf
 
 
 def test_limits_and_numbers_that_are_none():
