@@ -38,9 +38,7 @@ def blocks(text: str, language: str) -> list[str]:
 
 
 @pytest.mark.parametrize("page", [README, WRITTEN["first_cell"]], ids=["README", "first cell"])
-def test_python_of_the_pages_runs_and_says_what_it_promises(
-    page: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_python_of_the_pages_runs_and_says_what_it_promises(page, capsys):
     (code,) = blocks(page, "python")
     names: dict[str, Any] = {}
     exec(compile(code, "page", "exec"), names)
@@ -60,9 +58,7 @@ def test_case_files_of_the_pages_are_feasible() -> None:
     assert clear.task.collision.checked == ("self", "surface", "scene")
 
 
-def test_commands_of_the_pages_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_commands_of_the_pages_run(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     for name, page in (("case", "first_cell"), ("study", "studies")):
         (text,) = blocks(WRITTEN[page], "toml")
@@ -174,9 +170,7 @@ def test_the_reference_lists_each_public_name_once() -> None:
     assert sorted([*listed, "__version__"]) == dir(coverable)
 
 
-def test_every_public_name_has_an_example_that_runs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_public_name_has_an_example_that_runs(tmp_path, monkeypatch):
     """In the reference, where examples follow each other, or in its docstring."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(webbrowser, "open", lambda url: False)

@@ -55,9 +55,7 @@ def measured(benchmark: Any, fk_us: float) -> Callable[..., Any]:
     return measure
 
 
-def pytest_terminal_summary(
-    terminalreporter: pytest.TerminalReporter, config: pytest.Config
-) -> None:
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config):
     """The counts, below the table of times."""
     session = getattr(config, "_benchmarksession", None)
     for bench in session.benchmarks if session else ():

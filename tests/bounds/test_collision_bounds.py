@@ -189,9 +189,7 @@ def test_a_closer_look_certifies_no_more_than_there_is(calls):
     for start in range(0, 60, 6):
         rows = walk[start : start + 6]
         q = np.concatenate([np.linspace(*ends, 15) for ends in pairwise(rows)])
-        ((one,), (fine,)) = (
-            pairings(robot, each, solid, [], None, 0.0, [soup]) for each in (rows, q)
-        )
+        (one,), (fine,) = (pairings(robot, x, solid, [], None, 0.0, [soup]) for x in (rows, q))
         truth = fine.lines(np.arange(len(q), dtype=float))[0].reshape(-1, 15).min(axis=1)
         one.certify(0.0)
         if one.refused is not None:

@@ -17,9 +17,7 @@ from surfaces.meshes.triangle_mesh import TriangleMesh
 
 OUT = {"side": "outside"}
 TASK = Task(0.01, 20, 1e-3)
-SLIDES = robot_of(
-    [joint(k, "prismatic", axis=axis) for k, axis in ((1, (1, 0, 0)), (2, (0, 0, 1)))]
-)
+SLIDES = robot_of([joint(k, "prismatic", axis=x) for k, x in ((1, (1, 0, 0)), (2, (0, 0, 1)))])
 FLOOR = plane((0.0, 1.0), (-1.0, 1.0), **OUT)
 PIPE = cylinder(0.02, (-170, 170), (-1, 1), rpy_deg=(90, 0, 0), **OUT)  # along y, its seam to -x
 VALLEY = mesh(TriangleMesh(*mesh_patches.bent(

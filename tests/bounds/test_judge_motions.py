@@ -73,9 +73,7 @@ def test_figures_bound_what_dense_samples_find_and_hardly_more(name):
     assert figures.waypoints == len(made.q)
     back = ask(made, made.q[::-1], marks_of(made)[::-1])
     assert back.accepted, back.refusal
-    assert back.certificate.max_position_error == pytest.approx(
-        figures.max_position_error, rel=1e-6
-    )
+    assert back.certificate.max_position_error == pytest.approx(figures.max_position_error)
     assert figures.max_position_error <= made.task.effective_tolerance
     if name == "sheets":  # at a crease normals do not lead to the closest point
         return
@@ -292,9 +290,7 @@ def test_round_an_outer_edge_the_tool_keeps_its_distance_from_the_edge(side, tur
 @pytest.mark.parametrize(("cone_deg", "off", "good"), [
     (20, 0.0, True), (13, 0.0, True), (10, 0.0, False), (20, 0.25e-3, True), (20, 1.1e-3, False),
 ])  # fmt: skip
-def test_at_an_inner_crease_the_tool_changes_plates_where_it_is_right_over_both(
-    cone_deg, off, good
-):
+def test_at_an_inner_crease_the_tool_changes_plates_where_it_is_over_both(cone_deg, off, good):
     """Where the parallels of both meet, by half of the turn from either normal."""
     turn, h = 0.4, 0.02
     plates = [plane((0.0, 0.1), (-0.1, 0.1))]

@@ -44,9 +44,7 @@ def test_a_setting_can_complete_a_file_with_windows_line_ends(tmp_path: Path) ->
         load_case("paper/4A")
 
 
-def test_paths_are_relative_to_the_case_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_paths_are_relative_to_the_case_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     text = changed(goods("case")["mesh"], ["robot.name", "robot.limits", 'robot.urdf = "arm.urdf"'])
     text = changed(text, 'robot.package_dirs = ["meshes"]') + '[collision]\nsrdf = "a.srdf"\n'
     text += '[[collision.scene]]\nname = "a"\nkind = "mesh"\nfile = "b.stl"\n'
@@ -139,9 +137,7 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("settings", CHANGES)
-def test_only_what_has_changed_is_changed(
-    settings: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_only_what_has_changed_is_changed(settings, tmp_path, monkeypatch):
     """Comments, paths and short arrays stay as the file has them."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "case.toml").write_text(FILE)

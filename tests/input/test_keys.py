@@ -184,9 +184,7 @@ def edges_of(said: str) -> tuple[list[Any], list[Any]] | None:
         "the path of": ([], ["", " ", 0, True, math.nan, [], {}, ["part"]]),
         "true or false": ([True, False], [0, 1, "true", [], {}]),
     }  # fmt: skip
-    fits = [
-        start for start in starts if re.fullmatch(rf"{re.escape(start)}(?! > 0)( .*|,.*)?", said)
-    ]
+    fits = [one for one in starts if re.fullmatch(rf"{re.escape(one)}(?! > 0)( .*|,.*)?", said)]
     return starts[max(fits, key=len)] if fits else None
 
 

@@ -70,9 +70,7 @@ def alone(work: Callable[[], str], folder: Path) -> Outcome:
     return Outcome(said, opened, used.ru_utime + used.ru_stime, used.ru_maxrss * 1024)
 
 
-def within_limits(
-    outcome: Outcome, own: set[str] | None = None, folder: Path | None = None
-) -> None:
+def within_limits(outcome: Outcome, own: set[str] | None = None, folder: Path | None = None):
     """Not over 1 GB, not over 20 s, not without its sentence, and no other file opened."""
     assert "Traceback" not in outcome.said
     assert outcome.memory < MOST_MEMORY, f"{outcome.memory >> 20} MB"

@@ -124,9 +124,7 @@ def test_an_earlier_format_and_as_many_members_as_may_be(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("slanted", [False, True])
-def test_cuts_of_earlier_formats_are_read_along_one_joint_alone(
-    slanted: bool, tmp_path: Path
-) -> None:
+def test_cuts_of_earlier_formats_are_read_along_one_joint_alone(slanted: bool, tmp_path: Path):
     content, file = dict(members("proof")), io.BytesIO()
     weights = np.zeros((5, 6))
     weights[[0, 1], [2, 3]] = 1.0
@@ -142,9 +140,7 @@ def test_cuts_of_earlier_formats_are_read_along_one_joint_alone(
 
 
 @pytest.mark.parametrize("kind", ["mesh", "bspline"])
-def test_a_result_is_not_shown_on_another_surface(
-    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_result_is_not_shown_on_another_surface(kind, tmp_path, monkeypatch):
     """A file that has changed, is gone or another; what another file holds is never said."""
     file = tmp_path / {"mesh": "part.stl", "bspline": "net.json"}[kind]
     cells = "12" if kind == "mesh" else "[3, 4]"

@@ -44,9 +44,7 @@ def test_a_number_of_threads_that_is_none(value: str, monkeypatch: pytest.Monkey
     ("check", "paper/4a", *SMALL, "--html", "view.html"),
     ("study", "study.toml", "--out", "out.study"), ("check", "case.toml"),
 ])  # fmt: skip
-def test_a_working_directory_that_is_gone(
-    args: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_working_directory_that_is_gone(args, tmp_path, monkeypatch):
     (tmp_path / "gone").mkdir()
     monkeypatch.chdir(tmp_path / "gone")
     (tmp_path / "gone").rmdir()

@@ -109,9 +109,7 @@ def test_without_the_extra_it_is_named(tmp_path: Path, monkeypatch: pytest.Monke
         check_urdf(tmp_path / "gone.xacro")
 
 
-def test_external_entities_and_the_environment_are_not_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_external_entities_and_the_environment_are_not_read(tmp_path, monkeypatch):
     (tmp_path / "secret").write_text("secret")
     path = tmp_path / "one.xacro"
     path.write_text(

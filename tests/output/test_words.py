@@ -150,9 +150,8 @@ def test_a_part_of_the_surface_is_proposed_in_the_words_of_its_kind(name, plate)
 def test_thresholds_that_there_was_no_time_for_are_named(plate):
     hasty = coverable.explain(*plate[0].build()[:3], coverable.Search(time_limit=1e-9))
     said = " ".join(explained.as_text(hasty, "plate").split())
-    assert (
-        "ran out before any threshold was searched; unknown: " + ", ".join(hasty.left_out) in said
-    )
+    start = "ran out before any threshold was searched; unknown: "
+    assert start + ", ".join(hasty.left_out) in said
     assert "cone" in hasty.left_out
 
 

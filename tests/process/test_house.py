@@ -32,9 +32,7 @@ COMMAND = "from feasibility.cli.main import main; main({})"
     (COMMAND.format(["check", "--hlep"]), {"feasibility"},
      {"numpy", "numba", "pinocchio", "coal", "scipy", "networkx", "robots"}),
 ], ids=["import", "refused"])  # fmt: skip
-def test_libraries_are_loaded_where_they_are_used(
-    code: str, needed: set[str], late: set[str]
-) -> None:
+def test_libraries_are_loaded_where_they_are_used(code: str, needed: set[str], late: set[str]):
     found = loaded(code)
     assert needed <= found
     assert not found & (HEAVY | late)
@@ -43,11 +41,9 @@ def test_libraries_are_loaded_where_they_are_used(
 def test_loading_the_judge_loads_nothing_of_the_search() -> None:
     found = loaded("from coverable import replay; replay.__module__")
     ours = {name for name in found if name.startswith("feasibility.")}
-    searching = ("roadmap", "paper", "checking", "attempts", "collisions.kernels")
+    search = ("roadmap", "paper", "checking", "attempts", "collisions.kernels")
     assert "feasibility.certification.motion_replay" in ours
-    assert not [
-        name for name in ours if name.startswith(tuple(f"feasibility.{s}" for s in searching))
-    ]
+    assert not [name for name in ours if name.startswith(tuple(f"feasibility.{s}" for s in search))]
     assert "robots.chain" not in found
 
 

@@ -35,9 +35,7 @@ ME, OTHER, SYSTEM, GROUP, USERS = 1000, 1001, 0, 100, 200
     ((ME, GROUP, 0o775), (ME, GROUP, 0o775), True),  # the same people can change the code
     ((ME, USERS, 0o775), (ME, GROUP, 0o775), False),
 ])  # fmt: skip
-def test_what_is_as_safe_as_the_code(
-    found: tuple[int, int, int], code: tuple[int, int, int], safe: bool
-) -> None:
+def test_what_is_as_safe_as_the_code(found, code, safe):
     def status(user: int, group: int, mode: int) -> os.stat_result:
         return os.stat_result((stat.S_IFDIR | mode, 1, 1, 1, user, group, 0, 0, 0, 0))
 

@@ -439,7 +439,7 @@ def of_study(one: Any) -> Json:
         "study": str, "description": str, "parameters": list(one.study.labels),
         "collisions": list, "tasks": len(one.rows),
         "verdicts": {
-            word: sum(row.result["verdict"] == word for row in one.rows) for word in words
+            w: sum(row.result["verdict"] == w for row in one.rows) for w in words
         },
         "failed": sum(row.status == "failed" for row in one.rows),
         "rows": [

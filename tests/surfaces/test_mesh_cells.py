@@ -118,14 +118,12 @@ def to_segments(points, starts, ends):
 
 
 def test_centres_are_deep_inside_their_cells(cut):
-    found, weights = cut.figures, cut.figures.weights
+    found, share = cut.figures, cut.figures.weights
     np.testing.assert_array_equal(cut.labels[found.faces], np.arange(N))
-    assert weights.min() >= -1e-12
-    np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=1e-12)
+    assert share.min() >= -1e-12
+    np.testing.assert_allclose(share.sum(axis=1), 1.0, atol=1e-12)
     own = cut.faces[found.faces]
-    points, normals = (
-        np.einsum("nk,nkc->nc", weights, x[own]) for x in (cut.vertices, cut.normals)
-    )
+    points, normals = (np.einsum("nk,nkc->nc", share, x[own]) for x in (cut.vertices, cut.normals))
     np.testing.assert_allclose(found.centres, points, atol=1e-13)
     np.testing.assert_allclose(found.normals, unit(normals), atol=1e-12)
     for cell in range(N):

@@ -210,9 +210,7 @@ def bead(flank: float):
 
 @pytest.mark.parametrize(("share", "kept"), [(4.0, 0.996), (1.0, 0.5), (0.5, 1.0 / 17.0)])
 def test_a_wave_of_the_length_keeps_half_its_height(share, kept):
-    wave = bent(
-        lambda u, v: (u, 0.5 * v, 1e-3 * np.sin(2.0 * np.pi * u / (share * LENGTH))), 120, 60
-    )
+    wave = bent(lambda u, v: (u, 0.5 * v, 1e-3 * np.sin(2 * np.pi * u / (share * LENGTH))), 120, 60)
     corners = smoothed(mesh(TriangleMesh(*wave)), LENGTH, 1.0).mesh.vertices
     inner = (abs(corners[:, :2] - [0.5, 0.25]) < [0.3, 0.1]).all(axis=1)
     assert abs(corners[inner, 2]).max() == pytest.approx(1e-3 * kept, rel=0.1)

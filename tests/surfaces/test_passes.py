@@ -188,9 +188,7 @@ def test_over_many_triangles_distances_are_taken_on_a_copy(monkeypatch):
 
 
 @pytest.mark.parametrize("source", [7, 2**32 - 1])
-def test_vertices_that_distances_do_not_reach_take_theirs_from_their_neighbours(
-    source, monkeypatch
-):
+def test_vertices_that_distances_do_not_reach_take_theirs_from_neighbours(source, monkeypatch):
     """Rounding may lose vertices; pygeodesic names any source of them, or fails over its number."""
     rng, measured = np.random.default_rng(5), geodesic.PyGeodesicAlgorithmExact.geodesicDistances
     fails = [OverflowError] * (source >= 2**31)

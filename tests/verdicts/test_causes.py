@@ -138,17 +138,15 @@ def test_what_is_in_the_way_is_named_with_its_distance(gap):
     assert asked_beside(wall, 0.0).feasible == (gap > 0.0)
 
 
-@pytest.mark.parametrize(
-    ("clearance", "words"), [(0.0, "collide"), (0.005, "come nearer than 5 mm")]
-)
-def test_what_stops_a_motion_on_its_way_is_named(clearance, words):
+@pytest.mark.parametrize(("clearance", "end"), [(0.0, "collide"), (0.005, "come nearer than 5 mm")])
+def test_what_stops_a_motion_on_its_way_is_named(clearance, end):
     """A wall between two cells."""
     cells = plane((0.4, 0.6), (-0.2, 0.2), "outside", (0.0, 0.0, 0.3)).cells(1, 2)
     wall = coverable.Obstacle.box("wall", (0.5, 0.01, 0.3), position=(0.5, 0.0, 0.3))
     asked = coverable.Collision(clearance=clearance, scene=(wall,))
     (cause,) = check(UR5, cells, Task(0.02, 30), Search(evaluations=3000), collision=asked).causes
     assert (cause.kind, cause.pair[1]) == (CauseKind.DISCONNECTED, "wall")
-    assert cause.detail.endswith(f"{' and '.join(cause.pair)} would {words}")
+    assert cause.detail.endswith(f"{' and '.join(cause.pair)} would {end}")
 
 
 def test_all_that_is_under_a_roof_names_it():

@@ -46,9 +46,7 @@ def test_a_seed_fixes_the_verdict_and_the_motion(name):
     told = []
     progress = lambda done, total, text: told.append((done, total, text))  # noqa: E731
     seed = question(name).search.seed
-    same(
-        verdict_of(name), ask(name, search=Search(seed=seed, time_limit=3600.0), progress=progress)
-    )
+    same(verdict_of(name), ask(name, search=Search(seed=seed, time_limit=3600), progress=progress))
     total = len(question(name).cells)
     assert told
     assert all(0 <= done <= (total if most is None else most) for done, most, _ in told)

@@ -27,9 +27,7 @@ KEPT = {*spread(TABLE, 22), "a crease inwards", "pieces apart", "inside the shou
 KEPT |= {*names("paper"), *names("bodies"), *names("rolls"), names("poses")[3]}
 KEPT -= {names("rolls")[5]}
 TABLE = [name for name in TABLE if name in KEPT]
-OTHERS = [
-    name for file, few in STORED.items() for name in (spread(stored(file), few) if few else ())
-]
+OTHERS = [name for file, few in STORED.items() for name in spread(stored(file), few)]
 OTHERS.append("puma560 197")  # two of its components cover as many cells
 
 ALL = TABLE + OTHERS

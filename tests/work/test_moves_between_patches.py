@@ -20,9 +20,7 @@ from robots.kinematics import Kinematics
 
 UR5 = load_robot("ur5")
 POST = Obstacle.box("post", (0.1, 0.1, 1.2), position=(0.45, 0.0, 0.6))
-BEHIND = plane(
-    (-0.1, 0.1), (-0.2, 0.2), position=(-0.6, 0.0, 0.3), rpy_deg=(0, -90, 0), side="inside"
-)
+BEHIND = plane((-0.1, 0.1), (-0.2, 0.2), "inside", (-0.6, 0.0, 0.3), (0, -90, 0))
 POSTURE = {"shoulder_pan_joint": (-180, 180), "shoulder_lift_joint": (-90, 0),
            "elbow_joint": (0, 150), "wrist_1_joint": (-120, 120)}  # fmt: skip
 """The last one is not folded back onto the forearm."""
