@@ -152,9 +152,8 @@ def test_distances_pairs_and_lines_are_those_of_the_closed_form():
         assert set(pair.rows) == set(here) | {k + 1 for k in here if k + 1 < len(rows)}
         clear = away[pair.rows, names.index(pair.names[1])]
         lines, at_rows, clear = pair.points[clear > 0], pair.rows[clear > 0], clear[clear > 0]
-        np.testing.assert_allclose(
-            np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1), clear, 0, 1e-6
-        )
+        length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1)
+        np.testing.assert_allclose(length, clear, 0, 1e-6)
         ends = np.linalg.norm(lines - tips[at_rows, None], axis=2).min(axis=1)
         np.testing.assert_allclose(ends, 0.03, atol=1e-5)
     assert nearest_along(UR5, replace(bodies, pairs=()), np.zeros((3, UR5.n))) is None

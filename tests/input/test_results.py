@@ -56,10 +56,8 @@ def again(verdict: Verdict, case: Case, folder: Path) -> Verdict:
     """The verdict out of a file, which holds nothing but numbers and one text."""
     loaded = load_result(save_result(verdict, case, folder / "a.result"))
     assert (loaded.case, loaded.case.name, loaded.version) == (case, case.name, version())
-    path = folder / "b.result"
-    assert (
-        save_result(loaded.verdict, case, path).read_bytes() == (folder / "a.result").read_bytes()
-    )
+    path = save_result(loaded.verdict, case, folder / "b.result")
+    assert path.read_bytes() == (folder / "a.result").read_bytes()
     return loaded.verdict
 
 

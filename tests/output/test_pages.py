@@ -25,9 +25,8 @@ def pages():
     names = (EVIL, *setup.robot.joint_names[1:])
     robot = replace(setup.robot, name=EVIL, joint_names=names)
     verdict = check(robot, *setup[1:])
-    region = coverable.Region.around(
-        coverable.Pose.of_surface(setup.cells.surface), {"x": (3.0, 3.1)}
-    )
+    pose = coverable.Pose.of_surface(setup.cells.surface)
+    region = coverable.Region.around(pose, {"x": (3.0, 3.1)})
     placed = coverable.place(robot, setup.cells, setup.task, region)
     asked = read_study('base.case = "paper/4a"\nvary."task.cone_deg" = [30]\n')
     result = {"verdict": "undecided", "evidence": "budget", "message": EVIL}

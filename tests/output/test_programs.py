@@ -209,9 +209,8 @@ def test_lines_stand_at_their_samples(tmp_path, file, name, move, on):
     sample = [[sum(m < k for m in moves) - (not before) for k in found] for found in (begins, ends)]
     assert sample == [[20, 60], [40, 60]]
     # From the first sample on: a trigger at the start of the first motion of the spline.
-    save_program(
-        tmp_path / file, robot, replace(run, cell=np.zeros(len(run), int)), settings=MARKED
-    )
+    over = replace(run, cell=np.zeros(len(run), int))
+    save_program(tmp_path / file, robot, over, settings=MARKED)
     lines = [line.strip() for line in (tmp_path / file).read_text().splitlines()]
     moves = [k for k, line in enumerate(lines) if re.search(move, line)]
     assert [k for k, line in enumerate(lines) if re.match(on, line)] == [
