@@ -128,23 +128,17 @@ def test_causes_are_grouped_and_the_largest_group_comes_first(plate, approved):
     approved("causes", "\n".join(texts))
 
 
-PARTS = {
-    "plate": "a narrower surface.u or surface.v", "waist of points": "a part of the grid",
-    "ring of poses": "a part of the poses", "dome of halves": "choice of surface.pieces",
-    "4a as a mesh": "(surface.box, cut, facing or faces)",
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", PARTS)
-def test_a_part_of_the_surface_is_proposed_in_the_words_of_its_kind(name, plate):
-    case, verdict = plate
-    cells, cause = question(name).cells, Cause(0, CauseKind.DISCONNECTED, False, "")
-    text = report.as_text(replace(
-        verdict, cells=cells, covered=np.zeros(len(cells), dtype=bool), causes=(cause,),
-        answer=Answer.UNDECIDED, message="The time limit ran out.", certificate=None, witness=None,
-    ), case)  # fmt: skip
-    assert PARTS[name] in text
-    assert "--set search.time_limit=... gives the search more time" in text
+def test_a_part_of_the_surface_is_proposed_in_the_words_of_its_kind(plate, approved):
+    (case, verdict), lines = plate, []
+    for name in ("plate", "waist of points", "ring of poses", "dome of halves", "4a as a mesh"):
+        cells, cause = question(name).cells, Cause(0, CauseKind.DISCONNECTED, False, "")
+        text = report.as_text(replace(
+            verdict, cells=cells, covered=np.zeros(len(cells), dtype=bool), causes=(cause,),
+            answer=Answer.UNDECIDED, message="The time limit ran out.", certificate=None,
+            witness=None,
+        ), case)  # fmt: skip
+        lines.append(f"{name}: " + "; ".join(map(str.strip, text.splitlines()[-3:-1])))
+    approved("a part", "\n".join(lines))
 
 
 def test_thresholds_that_there_was_no_time_for_are_named(plate):
