@@ -48,7 +48,7 @@ def scene_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
     scene = sorted(bodies.scene, key=lambda one: one.joint > 0)
     meshes = thinned([_mesh_of(one, robot) for one in scene], TRIANGLES)
     groups = joint_paths(robot)
-    parts = []
+    parts, carried = list[Layer](), list[Layer]()
     for number, (one, mesh) in enumerate(zip(scene, meshes, strict=True)):
         if not len(mesh.faces):
             continue
@@ -56,11 +56,11 @@ def scene_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
         path = f"{groups[one.joint] if one.joint else ''}/scene/{number} {name}"
         lines = threejs.segments(f"{path}/edges", _edges(mesh), EDGES)
         drawn = (mesh_command(f"{path}/body", mesh), lines)
-        parts.append(Layer(drawn, Entry(one.owner, SCENE, path)))
-    if len(parts) <= MOST_ENTRIES:
-        return parts
-    every = tuple(command for part in parts for command in part.commands)
-    return [Layer(every, Entry(f"scene ({len(parts)} objects)", SCENE, "/scene"))]
+        (carried if one.joint else parts).append(Layer(drawn, Entry(one.owner, SCENE, path)))
+    if len(parts) > MOST_ENTRIES:
+        every = tuple(command for part in parts for command in part.commands)
+        parts = [Layer(every, Entry(f"scene ({len(parts)} objects)", SCENE, "/scene"))]
+    return parts + carried
 
 
 def tool_layers(bodies: Bodies, robot: Robot) -> list[Layer]:

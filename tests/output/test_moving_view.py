@@ -160,7 +160,8 @@ def test_the_world_stands_still_while_the_motion_plays(table):
 
 def test_bodies_move_with_the_arm_and_the_nearest_pair_has_its_distance(verdict):
     scene = (Obstacle.box("shelf", (0.4, 0.3, 0.02), (0.3, -0.6, 0.5), (0.0, 0.0, 30.0)),
-             *(Obstacle.capsule(f"pin {k}", 0.05, 0.4, (k, 9, 9)) for k in range(8)))  # fmt: skip
+             *(Obstacle.capsule(f"pin {k}", 0.05, 0.4, (k, 9, 9)) for k in range(8)),
+             Obstacle.sphere("held", 0.01, frame="link6"))  # fmt: skip
     ball = coverable.ToolShape.sphere(0.01, (0.0, 0.0, -0.02))
     asked = Collision(surface=False, scene=scene, tool=(ball,))
     drawn = view(replace(verdict, task=replace(verdict.task, collision=asked)), play=False, at=0.5)
@@ -169,7 +170,9 @@ def test_bodies_move_with_the_arm_and_the_nearest_pair_has_its_distance(verdict)
     _, pin = object_at(commands, "pin 4/body")
     ends = np.add([4, 9, 9], np.outer([-1, 1], [0.05, 0.05, 0.25]))
     np.testing.assert_allclose([pin.min(axis=0), pin.max(axis=0)], ends, atol=1e-4)
-    assert {one.path: one.label for one in drawn.legend.entries}["/scene"] == "scene (9 objects)"
+    entries = {one.label: one.path for one in drawn.legend.entries}
+    assert entries["scene (9 objects)"] == "/scene"
+    assert entries["held"].startswith("/robot/")  # /scene does not hide it
     own = (shelf - scene[0].placement[:3, 3]) @ scene[0].placement[:3, :3]
     np.testing.assert_allclose(np.abs(own), np.tile([0.2, 0.15, 0.01], (len(own), 1)), atol=2e-5)
     joints = [path for path in places if path.startswith("/robot")]
