@@ -53,7 +53,7 @@ class _Version(argparse.Action):
         raise SystemExit(0)
 
 
-def _parser(command: str = "") -> argparse.ArgumentParser:
+def parser_of(command: str = "") -> argparse.ArgumentParser:
     """The arguments of the command line: of a command and those beside it, or of all."""
     parser = _Parser(
         prog="coverable",
@@ -84,7 +84,7 @@ def main(argv: Sequence[str] | None = None, clock: MakeClock | None = None) -> i
         with enforcing():
             prepare()
             words = sys.argv[1:] if argv is None else argv
-            parser = _parser(next(iter(words), ""))
+            parser = parser_of(next(iter(words), ""))
             args, unknown = parser.parse_known_args(words)
             if unknown:
                 parser.prog = f"coverable {args.command}"  # whose help names what there is

@@ -92,19 +92,19 @@ class Arm:
         roots = [robot_visuals.ROBOT] + [HULLS] * (self.setup.task.collision is not None)
         commands = [one for root in roots for one in robot_visuals.pose(robot, q, root)]
         self._scene.run(self.grouped(commands))
-        for slider, value in zip(self._sliders, self._shown(q), strict=True):
+        for slider, value in zip(self.sliders, self._shown(q), strict=True):
             slider.value = value
-        self._said.content = ""
+        self.words.content = ""
 
     # -- joints ----------------------------------------------------------------------------------
 
-    _sliders: Sequence[Any] = ()
+    sliders: Sequence[Any] = ()
 
     def add_jog(self) -> None:
         """Add a slider for each joint, between its limits, and what is read at that place."""
         gui, robot = self._client.gui, self.setup.robot
         with gui.add_folder(JOG, expand_by_default=False):
-            self._said, self._sliders = gui.add_html(""), []
+            self.words, self.sliders = gui.add_html(""), []
             ends = np.stack([self._shown(robot.lower), self._shown(robot.upper)])
             for joint, (low, high) in enumerate(np.clip(ends, -np.inf, np.inf).T.tolist()):
                 low, high = max(low, -TURN * 3), min(high, TURN * 3)
@@ -113,16 +113,16 @@ class Arm:
                 name = f"{robot.joint_names[joint]} ({unit})"
                 slider = gui.add_slider(name, low, high, STEP / 5, initial_value=start)
                 slider.on_update(self._jogged)
-                self._sliders.append(slider)
+                self.sliders.append(slider)
 
     def _jogged(self, event: Any) -> None:
         """A joint was moved by hand."""
         if event.client_id is None:
             return
         robot = self.setup.robot
-        values = np.array([slider.value for slider in self._sliders])
+        values = np.array([slider.value for slider in self.sliders])
         self.pose(values / np.where(robot.prismatic, 1e3, 180.0 / math.pi))
-        self._said.content = (
+        self.words.content = (
             f'<div style="font-size:85%;margin:0 1em">{html.escape(self.said())}</div>'
         )
 

@@ -47,7 +47,7 @@ class Handle:
         self.gizmo.on_update(self._dragged)
         if len(controls.in_root_frame) > 1:
             choice = client.gui.add_dropdown("the handle moves", tuple(controls.in_root_frame))
-            choice.on_update(lambda event: self._choose(event.target.value))
+            choice.on_update(lambda event: self.choose(event.target.value))
 
     def painted(self, values: Values) -> None:
         """The cells are drawn anew, where the surface has these values."""
@@ -71,7 +71,8 @@ class Handle:
         """(3,) m, where the handle sits in the frame of what it moves."""
         return self._middle if self.group == SURFACE else np.zeros(3)
 
-    def _choose(self, group: str) -> None:
+    def choose(self, group: str) -> None:
+        """Move another thing from now on: the surface, the base or an object."""
         self.group = group
         self.place(self._values)
 

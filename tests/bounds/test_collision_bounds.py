@@ -131,7 +131,7 @@ def test_no_bound_is_above_a_distance(step):
                 for first, last in ((0.0, 1.0), (1.25, 1.75), (2.5, 3.0)):
                     times = np.linspace(first, last, 9)
                     truth = one.lines(times)[0].min()
-                    n = rng.normal(size=3) if truth <= 0.0 else one._gaps(*one.motion.poses(
+                    n = rng.normal(size=3) if truth <= 0.0 else one.gaps(*one.motion.poses(
                         one.a.joint, one.b.joint, times[4:5]))[1][0]  # fmt: skip
                     found = one.parted(np.array([[first, last]]), n[None])[0]
                     spare.append((truth + COAL - one.low[int(first)], truth + COAL - found))

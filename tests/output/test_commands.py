@@ -19,7 +19,7 @@ from page_outline import Page, fetched
 
 import coverable
 from coverable import check, load_case, load_motion, open_workers, pass_runs, trajectory, verify
-from feasibility.cli.main import _parser
+from feasibility.cli.main import parser_of
 from feasibility.collisions.words import UNCHECKED
 from feasibility.demands.area import treated_by_walk
 from feasibility.demands.motion_rates import path_rates
@@ -125,7 +125,7 @@ def test_what_is_refused_is_one_message_on_stderr_and_status_2(commands, approve
 
 
 def test_the_flags_of_every_command(commands, approved):
-    (choices,) = (action for action in _parser()._actions if action.choices)
+    (choices,) = (action for action in parser_of()._actions if action.choices)
     assert set(choices.choices) == {*TABLE, "robots", "keys", "live", "warm-up"}
     lines = []
     for command in ("", *choices.choices):
@@ -288,7 +288,7 @@ def test_the_numbers_are_those_of_python(commands, command, name):
         words = [command, *shlex.split(name)]
         said = commands.say([*words, "--json"])
     found = json.loads(said.out, parse_constant=pytest.fail)  # NaN and inf
-    json_of.agree(found, globals()[f"of_{command}"](_parser().parse_args(words)))
+    json_of.agree(found, globals()[f"of_{command}"](parser_of().parse_args(words)))
     word = found.get("verdict") or found.get("answer")
     known = {"feasible": 0, "complete": 0, "holds": 0, "infeasible": 1, "partial": 1,
              "does not hold": 1, "undecided": 3, None: 0}  # fmt: skip

@@ -10,7 +10,7 @@ from jobs import run_coverable as asked
 import coverable
 from coverable import Pose, Region, load_case, load_motion, load_result, place, station_plan, verify
 from feasibility.cases.keys import all_keys
-from feasibility.cli.main import _parser
+from feasibility.cli.main import parser_of
 from feasibility.demands.every_demand import DEMANDS, further
 from feasibility.verdict import Walk
 
@@ -78,7 +78,7 @@ def test_every_key_is_a_demand_with_a_judge_or_has_a_reason_to_be_none():
             assert known, (
                 f"{names[0]}: who judges it (feasibility/demands/every_demand.py), or why nobody?"
             )
-    (commands,) = (action for action in _parser()._actions if action.choices)
+    (commands,) = (action for action in parser_of()._actions if action.choices)
     assert set(commands.choices) == JUDGING | set(OTHERS)
 
 

@@ -231,8 +231,8 @@ def test_base_tool_and_scene_are_drawn_where_they_are_moved_and_joints_are_moved
         )
         window.answered()
         robot, kinematics = page.arm.setup.robot, Kinematics(page.arm.setup.robot)
-        window.slide(page.arm._sliders[1], -70.0)
-        until(lambda: page.arm.said() in page.arm._said.content)
+        window.slide(page.arm.sliders[1], -70.0)
+        until(lambda: page.arm.said() in page.arm.words.content)
         q = page.arm.q
         assert np.degrees(q[1]) == pytest.approx(-70.0)
         data = robot.model.createData()
@@ -268,7 +268,7 @@ def test_the_handle_moves_what_is_chosen(window):
     assert [page.values[SURFACE, name] for name in ("z", "roll", "pitch")] == [
         page.controls.values[SURFACE, name] for name in ("z", "roll", "pitch")
     ]
-    handle._choose(BASE)
+    handle.choose(BASE)
     assert np.allclose(handle.gizmo.position, 0.0)
     window.drag((1.0, 0.0, 0.0, 0.0), np.array([0.0, 0.0, 0.2]))
     until(lambda: page.values[BASE, "z"] == 200.0)

@@ -53,7 +53,7 @@ def test_of_several_descents_the_nearest_counts():
     guesses = np.array([[3.0, 0.1], [0.0, 0.0]])
     arrays = arrays_of(robot, cells, task)
     for some, away in ((guesses[1:], 5.0), (guesses[::-1], 1.0), (guesses, 1.0)):
-        found = diagnosis._nearest_point(arrays, work_for(2), 0, np.ascontiguousarray(some))
+        found = diagnosis.nearest_point(arrays, work_for(2), 0, np.ascontiguousarray(some))
         assert found == pytest.approx(away, abs=1e-3)
 
 

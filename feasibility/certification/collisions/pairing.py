@@ -179,7 +179,7 @@ class Pairing:
     def part_at(self, row: int, wanted: float | Array, turns: bool = False) -> Mask:
         """(m - 1,) which segments have what is wanted (m), with a plane that parts at a row."""
         rotations, points = self._poses
-        (apart,), n = self._gaps(rotations[[row]], points[[row]])
+        (apart,), n = self.gaps(rotations[[row]], points[[row]])
         if apart > 0.0:
             self._raised(wanted, n)
             if turns:
@@ -214,7 +214,7 @@ class Pairing:
             parts = self._parts_by_coal(self.b.placed(*poses), middle, half, off)
         some = (parts > 0) & within & self._hulls_part
         if some.any() and self.refused is None:
-            apart, n = self._gaps(*(one[some] for one in poses))
+            apart, n = self.gaps(*(one[some] for one in poses))
             apart -= off[some] + ROUNDING
             if not (self.convex and self._near(apart, middle[some])):
                 self._hulls_part = self.convex or bool((apart >= self._aim).any())
@@ -258,7 +258,7 @@ class Pairing:
             self._aim, self.met = limit, float(times[worst])
         return False
 
-    def _gaps(self, rotations: Array, points: Array) -> tuple[Array, Array]:
+    def gaps(self, rotations: Array, points: Array) -> tuple[Array, Array]:
         """(k,) m, how far planes part the hulls with b at poses, and their normals (k, 3).
 
         From a to b, less what bodies stand out by, across the shortest line that coal finds. Where

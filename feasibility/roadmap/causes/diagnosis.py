@@ -46,7 +46,7 @@ MOST_DECIMALS = 6
 
 
 @allocating_entry
-def _nearest_point(arrays, work, cell, guesses):  # noqa: ANN001, ANN202
+def nearest_point(arrays, work, cell, guesses):  # noqa: ANN001, ANN201
     """Smallest distance of the tool point from the target, by damped descent from guesses."""
     n = guesses.shape[1]
     best = np.inf
@@ -201,7 +201,7 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
         detail = "a cone of 0 degrees leaves no margin in which a motion could be certified"
         return Cause(cell, CauseKind.ORIENTATION, False, detail)
     if not len(solutions(anything, work, cell, guesses)):
-        distance = _nearest_point(unlimited, work, cell, guesses[:6])
+        distance = nearest_point(unlimited, work, cell, guesses[:6])
         return Cause(cell, CauseKind.OUT_OF_REACH, proved, _short(exploration, cell, distance))
     found = solutions(unlimited, work, cell, guesses, ENOUGH)
     past = _past_limits(exploration, unlimited, cell, found) if len(found) else ""
