@@ -162,9 +162,9 @@ def _sewn(mesh: WorkingMesh, gap: float) -> WorkingMesh:
     for row, some in enumerate(around):
         ends = edges[row]
         inner = [int(k) for k in on_border[some] if k not in ends]
-        off = mesh.vertices[inner] - a[row]
-        along = off @ (b[row] - a[row]) / length[row]
-        away = np.linalg.norm(off - along[:, None] * (b[row] - a[row]) / length[row], axis=1)
+        off, way = mesh.vertices[inner] - a[row], (b[row] - a[row]) / length[row]
+        along = off @ way
+        away = np.linalg.norm(off - along[:, None] * way, axis=1)
         # What is nearer to an end is welded to it afterwards.
         between = (along > gap) & (along < length[row] - gap) & (away <= slack[row])
         if between.any():

@@ -26,7 +26,9 @@ JOINED = [torus(0.8, 0.3, u, (-20, 20)) for u in ((20, 40), (40, 60))]
 JOINED = piecewise(JOINED, side="inside").cells((2, 3))
 
 
-@pytest.mark.parametrize("cells", [JOINED, in_cells_of(RING, 6)], ids=["pieces", "mesh"])
+@pytest.mark.parametrize(
+    "cells", [RING, JOINED, in_cells_of(RING, 6)], ids=["ring", "pieces", "mesh"]
+)
 def test_triangles_say_what_the_surface_says(cells):
     """Heights, normals and cells within the stated deviations; beyond the border there is none."""
     rng = np.random.default_rng(0)

@@ -19,8 +19,7 @@ from feasibility.collisions.asked_bodies import gather
 from feasibility.collisions.kernels import link_frames
 from feasibility.collisions.kernels.tables import GROUPS, row, views
 from feasibility.collisions.problem_bodies import Bodies, Pair, Soup
-from robots.shapes.bodies import Polytope, Triangles
-from robots.shapes.coal_shapes import coal_hull, coal_shape
+from robots.shapes.bodies import Polytope
 
 LENGTH, RADIUS = 0.3, 0.03  # m, of each link, a capsule along x
 chord_deviation, place_bodies = link_frames.chord_deviation, link_frames.place_bodies
@@ -34,13 +33,9 @@ FINE = np.deg2rad(0.1)  # between samples, of the joint that moves most
 def serial_arm(rng: np.random.Generator, kinds: str, length: float = 0.3) -> Robot:
     """A chain of joints, R or P, with axes and placements made up."""
     named = {"R": "revolute", "P": "prismatic"}
-    return robot_of(
-        [
-            joint(k, named[kind], *rng.normal(size=(2, 3)) * [[length], [1.0]], rng.normal(size=3),
-                  (-3.0, 3.0))
-            for k, kind in enumerate(kinds, start=1)
-        ]
-    )  # fmt: skip
+    joints = [joint(k, named[kind], *rng.normal(size=(2, 3)) * [[length], [1.0]],
+                    rng.normal(size=3), (-3, 3)) for k, kind in enumerate(kinds, 1)]  # fmt: skip
+    return robot_of(joints)
 
 
 def hulls(rng: np.random.Generator, n: int, size: float = 0.08, at: float = 0.15) -> list[Polytope]:
@@ -74,12 +69,17 @@ class CoalScene:
         self.robot, self.bodies, self.data = robot, bodies, robot.model.createData()
         self.shapes = defaultdict(list)
         for body in bodies.polytopes:
-            shape, _ = coal_hull(body.vertices)
+            points = coal.StdVec_Vec3s()
+            points.extend(list(body.vertices))
+            shape = coal.Convex.convexHull(points, False, None)
             self.shapes[body.owner].append((body.joint, shape, body.radius))
         for soup in bodies.soups:
-            corners = soup.triangles.reshape(-1, 3)
-            mesh = Triangles(corners, np.arange(len(corners)).reshape(-1, 3), soup.closed)
-            self.shapes[soup.owner].append((0, coal_shape(mesh), 0.0))
+            model = coal.BVHModelOBBRSS()
+            model.beginModel(len(soup.triangles), 3 * len(soup.triangles))
+            for corners in soup.triangles:
+                model.addTriangle(*corners)
+            model.endModel()
+            self.shapes[soup.owner].append((0, model, 0.0))
 
     def distances(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
         """(P,) m, of all pairs at q; of hulls negative where they overlap."""
